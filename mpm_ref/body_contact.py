@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from math import inf
 
-from .core.body_contact import Cloud, Law, glue, keep_apart, mean_positions, shared_nodes
+from .core.body_contact import Cloud, glue, keep_apart, shared_nodes
 from .core.grid import Storage, update
 from .explicit import Stepper, scatter
 
@@ -81,7 +81,7 @@ class ContactStepper(Stepper):
         if scheme.degree == 1:
             raise ValueError("contact of bodies with degree 1: the mean positions by which gaps "
                              "are measured need splines with a slope; take degree 2 or 3")
-        self.contacts, self.xi = tuple(contacts), mean_positions(scheme.degree)
+        self.contacts = tuple(contacts)
         self.stores = {}
 
     def start(self, bodies):
@@ -127,9 +127,8 @@ class ContactStepper(Stepper):
             if rule is None or rule.kind == "stick":
                 glue(a[0], b[0], nodes)
             else:
-                law = Law(rule.friction, dt, self.dx, self.xi)
-                keep_apart((a[0], clouds(a[1])), (b[0], clouds(b[1])), nodes, law,
-                           self.scheme.stencil)
+                sides = [(grid, clouds(field)) for grid, field in (a, b)]
+                keep_apart(*sides, nodes, (rule.friction, dt), self.scheme.stencil)
 
     def constrain(self, grids, t, dt):
         """Apply the conditions to all grids, in the step from time t [s] by dt [s]."""
@@ -144,4 +143,4 @@ class ContactStepper(Stepper):
 
 def clouds(bodies):
     """Return the `Cloud` of each body."""
-    return [Cloud(body.particles.x, body.particles.V0) for body in bodies]
+    return [Cloud(q.x, q.V0, q.F) for q in (body.particles for body in bodies)]

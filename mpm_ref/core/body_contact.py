@@ -1,27 +1,24 @@
 """Contact of two bodies that have a velocity field each, at the nodes where both have mass.
 
-Near a node i the matter of body a has the volume, its moment and the mean position
+Near a node i the matter of a body fills a share of space, whose gradient points into it:
 
-    V_a = sum_p w_ip V0_p,   M_a = sum_p w_ip V0_p (x_p - x_i),   x_a - x_i = M_a/V_a
+    phi_i = sum_p w_ip V_p/dx^d,    G_i = -sum_p V_p dw_ip/dx^d,    V_p = |J_p| V0_p
 
-The normal from body 1 to body 2 is n = (M_2 - M_1)/|M_2 - M_1|, the gradient of the difference of
-the volumes but for a factor. A half-space whose surface is at the distance d in front of the node
-has its mean position at -xi(d) on the normal, xi(d) = -int_-inf^d s N(s) ds / int_-inf^d N(s) ds
-with the spline N; the inverse of xi gives the distances of both surfaces, and their gap
+The normal from body 1 to body 2 is n = (G_2 - G_1)/|G_2 - G_1|. Two half-spaces that touch fill all
+space, wherever the node lies; with a gap between them they leave free, to first order, as much as
+its width times the slope of the shares. So
 
-    g = -(d_1 + d_2) dx,    xi(d_1) = -n . M_1/V_1,   xi(d_2) = n . M_2/V_2
+    g = 2 (1 - phi_1 - phi_2)/|G_2 - G_1|
 
-which depends on no density. In a step of length dt the bodies may not approach by more than the gap
-is wide: with the mass m = m_1 m_2/(m_1 + m_2) and the velocity w = v_1 - v_2, body 2 gets from
-body 1 the impulse
+is the width of the gap. In a step of length dt it may close, and no more: with the mass
+m = m_1 m_2/(m_1 + m_2) and the velocity w = v_1 - v_2, body 2 gets from body 1 the impulse
 
     l n + t,    l = m (n . w - max(g, 0)/dt) where that is positive,
 
-where t is along w - (n . w) n, of the size that ends that sliding, but at most mu l, Coulomb's law.
-Impulses are equal and opposite at one point, so that momentum and moment of momentum are kept; no
-impulse adds energy. Without a gap bodies act on each other from the first common node on, more than
-a cell apart [Bardenhagen2001]; that a gap must close first is the criterion of [Nairn2013], with
-other measures of the gap and the normal.
+with t along w - (n . w) n, of the size that ends all sliding, but at most mu l, Coulomb's law. The
+impulses on both bodies are opposite and act at one point, so that momentum and its moment are kept;
+none adds energy. Without a gap bodies would act on each other from their first common node on, more
+than half a cell apart [Bardenhagen2001]; [Nairn2013] has other measures of it.
 """
 
 from itertools import product as tuples
@@ -31,11 +28,17 @@ import numpy as np
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
 from .order import slabs_of
-from .spline import base_of
-from .stencil import arm, column, columns, locate, node, product, weights_per_axis
-from .tensor import dot, lin, norm, put_vec, vec
-
-ENTRIES = 1025          # of a table of xi
+from .stencil import (
+    column,
+    columns,
+    gradient,
+    locate,
+    node,
+    product,
+    slopes_per_axis,
+    weights_per_axis,
+)
+from .tensor import det, dot, lin, mat, norm, put_vec, vec
 
 
 class Shared(NamedTuple):
@@ -46,18 +49,19 @@ class Shared(NamedTuple):
 
 
 class Cloud(NamedTuple):
-    """Particles of a field."""
+    """Particles of a body."""
 
-    x: np.ndarray           # (N, d)  position [m]
-    V0: np.ndarray          # (N,)    volume at rest [m^d]
+    x: np.ndarray           # (N, d)     position [m]
+    V0: np.ndarray          # (N,)       volume at rest [m^d]
+    F: np.ndarray           # (N, d, d)  deformation gradient, or (N,) its determinant
 
 
 class Matter(NamedTuple):
     """The matter of a field near K nodes."""
 
     slot: np.ndarray        # (n1, .., nd)  which of them a node of the grid is, or -1
-    V: np.ndarray           # (K,)    volume at rest [m^d]
-    M: np.ndarray           # (K, d)  its first moment about the node [m^(d+1)]
+    phi: np.ndarray         # (K,)          the share of space that it fills
+    G: np.ndarray           # (K, d)        the gradient of that share [1/m]
 
 
 class Side(NamedTuple):
@@ -66,44 +70,8 @@ class Side(NamedTuple):
     m: np.ndarray           # (n,)    mass of all its nodes [kg]
     v: np.ndarray           # (n, d)  velocity, which contact changes [m/s]
     node: np.ndarray        # (K,)    which of them
-    V: np.ndarray           # (K,)    volume near the node, see `Matter`
-    M: np.ndarray           # (K, d)
-
-
-class Law(NamedTuple):
-    """The rule between two fields in a step."""
-
-    mu: float               # coefficient of friction
-    dt: float               # [s]
-    dx: float               # [m]
-    xi: np.ndarray          # table of mean positions, see `mean_positions`
-
-
-def mean_positions(degree):
-    """Return the table of xi(d) at ENTRIES distances d from -r to r, r = (degree + 1)/2 cells: it
-    falls from r to 0.
-    """
-    r = 0.5 * (degree + 1)
-    s = np.linspace(-r, r, 16 * (ENTRIES - 1) + 1)
-    N = b_spline(s, degree)
-    V, M = integral(N, s), integral(s * N, s)
-    table = np.append(r, -M[16::16] / V[16::16])
-    table[-1] = 0.0
-    return table
-
-
-def b_spline(s, degree):
-    """Return the centred B-spline of a degree at s (K,) [cells], by its recursion."""
-    if degree == 0:
-        return np.where(np.abs(s) < 0.5, 1.0, 0.0)
-    r = 0.5 * (degree + 1)
-    return ((r + s) * b_spline(s + 0.5, degree - 1)
-            + (r - s) * b_spline(s - 0.5, degree - 1)) / degree
-
-
-def integral(y, s):
-    """Return the integral (K,) of y (K,) from the first of the points s (K,), by trapezoids."""
-    return np.append(0.0, np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(s)))
+    phi: np.ndarray         # (K,)    see `Matter`
+    G: np.ndarray           # (K, d)
 
 
 # both rules
@@ -116,14 +84,15 @@ def glue(a, b, nodes):
 
 
 def keep_apart(one, two, nodes, law, stencil):
-    """Change the velocities of two fields at `Shared` nodes by the `Law` of their contact.
+    """Change the velocities of two fields at `Shared` nodes by contact.
 
-    one and two are pairs of a grid and the clouds of its particles.
+    one and two are pairs of a grid and the clouds of its particles; law is the coefficient of
+    friction and the length of the step [s].
     """
     sides = []
     for (grid, clouds), at in zip((one, two), nodes, strict=True):
         matter = matter_near(at, clouds, grid, stencil)
-        sides.append(Side(*flat(grid), at, matter.V, matter.M))
+        sides.append(Side(*flat(grid), at, matter.phi, matter.G))
     _separate_all(*sides, law, tuple(range(one[0].m.ndim)))
 
 
@@ -156,7 +125,7 @@ def matter_near(nodes, clouds, grid, stencil):
     for cloud in clouds:
         marks = np.empty(len(cloud.x), dtype=np.bool_)
         _mark_all(cloud.x, grid, stencil, bases, marks)
-        near = Cloud(cloud.x[marks], cloud.V0[marks])
+        near = Cloud(*(a[marks] for a in cloud))
         slabs = slabs_of(near.x, grid, stencil)
         for color in (0, 1):
             _collect_color(near, grid, stencil, slabs, matter, color)
@@ -183,56 +152,45 @@ def mark(x, grid, stencil, bases, marks, bounds):
 
 @kernel
 def collect(cloud, grid, stencil, members, matter):
-    """V_i += w_ip V0_p, M_i += w_ip V0_p (x_p - x_i) for the particles listed in `members` and the
+    """phi_i += w_ip V_p/dx^d, G_i -= V_p dw_ip/dx^d for the particles listed in `members` and the
     nodes that have a slot.
     """
     d = grid.m.shape
     for p in members:
         base, s = locate(vec(cloud.x, p, d), grid, stencil)
-        w = weights_per_axis(s, stencil)
+        w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
+        share = cloud.V0[p] * abs(volume_ratio(cloud.F, p, d)) / grid.dx ** len(d)
         for c in range(columns(s, stencil)):
             k = column(c, stencil, d)
             for l in range(len(stencil)):
                 i = matter.slot[node(base, k, l)]
                 if i >= 0:
-                    V = product(k, l, w) * cloud.V0[p]
-                    matter.V[i] += V
-                    M = vec(matter.M, i, d)
-                    put_vec(matter.M, i, lin(1.0, M, -V, arm(k, l, s, grid.dx)))
+                    matter.phi[i] += share * product(k, l, w)
+                    dw_ip = gradient(k, l, w, dw, grid.dx)
+                    put_vec(matter.G, i, lin(1.0, vec(matter.G, i, d), -share, dw_ip))
+
+
+@kernel
+def volume_ratio(F, p, like):
+    """J of particle p."""
+    if F.ndim == 1:
+        return F[p]
+    else:
+        return det(mat(F, p, like))
 
 
 # the law at a node
 
 @kernel
-def depth(xi, table):
-    """Distance [cells] of the surface of a half-space in front of a node, from its mean position
-    -xi [cells] on the normal; at most half the width of the spline.
+def normal_and_gap(one, two, k, like):
+    """Unit vector n from body 1 to body 2 at node k, and the width of the gap [m], negative in an
+    overlap. Without a gradient n is zero.
     """
-    low, high = 0, len(table) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if table[middle] > xi:
-            low = middle
-        else:
-            high = middle
-    part = min(max((table[low] - xi) / (table[low] - table[high]), 0.0), 1.0)
-    return table[0] * (2.0 * (low + part) / (len(table) - 1) - 1.0)
-
-
-@kernel
-def normal(one, two, k, like):
-    """Unit vector from body 1 to body 2 at node k; zero where none is defined."""
-    n = lin(1.0, vec(two.M, k, like), -1.0, vec(one.M, k, like))
-    size = norm(n)
-    return lin(1.0 / size, n, 0.0, n) if size > 0.0 else n
-
-
-@kernel
-def gap(one, two, k, n, law):
-    """Width of the gap between both bodies at node k on the normal n [m], negative in overlap."""
-    d1 = depth(-dot(n, vec(one.M, k, n)) / (one.V[k] * law.dx), law.xi)
-    d2 = depth(dot(n, vec(two.M, k, n)) / (two.V[k] * law.dx), law.xi)
-    return -(d1 + d2) * law.dx
+    n = lin(1.0, vec(two.G, k, like), -1.0, vec(one.G, k, like))
+    slope = norm(n)
+    if not slope > 0.0:
+        return n, 0.0
+    return lin(1.0 / slope, n, 0.0, n), 2.0 * (1.0 - one.phi[k] - two.phi[k]) / slope
 
 
 @kernel
@@ -249,15 +207,17 @@ def impulse(mw, n, load, mu):
 
 @kernel
 def separate(one, two, law, like, bounds):
-    """Velocities of both sides after contact at the nodes bounds[0] .. bounds[1] - 1."""
+    """Velocities of both sides after contact at the nodes bounds[0] .. bounds[1] - 1; law is (mu,
+    dt).
+    """
+    mu, dt = law
     for k in range(bounds[0], bounds[1]):
         i, j = one.node[k], two.node[k]
         v1, v2 = vec(one.v, i, like), vec(two.v, j, like)
         m = one.m[i] * two.m[j] / (one.m[i] + two.m[j])
-        n = normal(one, two, k, like)
-        free = max(gap(one, two, k, n, law), 0.0) / law.dt
+        n, gap = normal_and_gap(one, two, k, like)
         mw = lin(m, v1, -m, v2)
-        l = impulse(mw, n, dot(n, mw) - m * free, law.mu)
+        l = impulse(mw, n, dot(n, mw) - m * max(gap, 0.0) / dt, mu)
         put_vec(one.v, i, lin(1.0, v1, -1.0 / one.m[i], l))
         put_vec(two.v, j, lin(1.0, v2, 1.0 / two.m[j], l))
 
