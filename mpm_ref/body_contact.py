@@ -69,6 +69,14 @@ def rules_of(contacts, names):
     return rules
 
 
+def check_contacts(contacts, names, scheme):
+    """Raise ValueError for contacts that do not fit the names of bodies, or the scheme."""
+    rules_of(contacts, names)
+    if contacts and scheme.degree == 1:
+        raise ValueError("contact of bodies with degree = 1: expected 2 or 3, whose weights have a "
+                         "continuous slope, from which the normal is taken")
+
+
 class ContactStepper(Stepper):
     """A `Stepper` of bodies some of which touch by `BodyContact`.
 
@@ -78,16 +86,13 @@ class ContactStepper(Stepper):
 
     def __init__(self, contacts, scheme, dx, gravity, conditions=None):
         super().__init__(scheme, dx, len(gravity), gravity, conditions)
-        if scheme.degree == 1:
-            raise ValueError("contact of bodies with degree 1: the mean positions by which gaps "
-                             "are measured need splines with a slope; take degree 2 or 3")
         self.contacts = tuple(contacts)
         self.stores = {}
 
     def start(self, bodies):
         """Start as `Stepper.start`. Raises ValueError for contacts that do not fit the bodies."""
         super().start(bodies)
-        rules_of(self.contacts, [body.name for body in bodies])
+        check_contacts(self.contacts, [body.name for body in bodies], self.scheme)
 
     def fields(self, bodies):
         """Return the bodies of each field, a list of lists: those without contact, and each that

@@ -119,6 +119,7 @@ class Stepper:
     """
 
     implicit = False     # whether dt is free of the bounds of waves
+    contacts = ()        # of bodies with each other (see `body_contact`)
     report = None        # what a solver says of the last step: nothing was solved
 
     def __init__(self, scheme, dx, dim, gravity, conditions=None):

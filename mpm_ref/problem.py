@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .body_contact import ContactStepper, rules_of
+from .body_contact import ContactStepper, check_contacts
 from .core.stencil import inverse_inertia
 from .energy_budget import BudgetStepper, EnergyBudget
 from .explicit import Scheme, Stepper
@@ -83,7 +83,7 @@ class Problem:
     def _check_contacts(self):
         if not self.contacts:
             return
-        rules_of(self.contacts, [body.name for body in self.bodies])
+        check_contacts(self.contacts, [body.name for body in self.bodies], self.scheme)
         if self.integrator != "explicit":
             raise ValueError(f"contacts with the integrator {self.integrator!r}: expected "
                              "'explicit', since their forces have no potential")

@@ -26,7 +26,7 @@ def mirror_removals(scene):
     for axis in range(scene.dim):
         c = float(middle[axis])
         sides = body_sides(scene, bodies, axis, c)
-        if sides is None or not is_symmetric(scene, axis, c):
+        if sides is None or not is_symmetric(scene, axis, c) or parts_a_contact(scene, sides):
             continue
         images = part_images(scene, samples_around(x, axis, c), axis)
         if None not in images.values():
@@ -35,6 +35,12 @@ def mirror_removals(scene):
             halved += [wall_name(a, side) for a in range(scene.dim) if a != axis for side in "-+"]
             yield Removal(f"half {AXES[axis]} < {c:.6g} m", half_edit(sides, axis, c),
                           "symmetry wall", half=Half(axis, c, tuple(halved)))
+
+
+def parts_a_contact(scene, sides):
+    """Return whether a body that is on one side of the plane has a contact: no wall replaces it."""
+    return any(side != 0 and body.name in contact.bodies
+               for contact in scene.contact for side, body in zip(sides, scene.body))
 
 
 def is_symmetric(scene, axis, c):
