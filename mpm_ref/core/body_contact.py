@@ -77,10 +77,15 @@ class Side(NamedTuple):
 # both rules
 
 def glue(a, b, nodes):
-    """Give two grids, whose velocities change, their common velocity at `Shared` nodes."""
-    nothing = np.empty(0), np.empty((0, a.m.ndim))
-    sides = [Side(*flat(grid), at, *nothing) for grid, at in zip((a, b), nodes, strict=True)]
-    _stick_all(*sides, tuple(range(a.m.ndim)))
+    """Give two grids their common velocity at `Shared` nodes; that before forces, too, where they
+    carry it.
+    """
+    d = a.m.ndim
+    nothing = np.empty(0), np.empty((0, d))
+    for name in ("v", "v_old") if a.v_old.ndim > 1 else ("v",):
+        sides = [Side(grid.m.reshape(-1), getattr(grid, name).reshape(-1, d), at, *nothing)
+                 for grid, at in zip((a, b), nodes, strict=True)]
+        _stick_all(*sides, tuple(range(d)))
 
 
 def keep_apart(one, two, nodes, law, stencil):
@@ -92,13 +97,9 @@ def keep_apart(one, two, nodes, law, stencil):
     sides = []
     for (grid, clouds), at in zip((one, two), nodes, strict=True):
         matter = matter_near(at, clouds, grid, stencil)
-        sides.append(Side(*flat(grid), at, matter.phi, matter.G))
+        sides.append(Side(grid.m.reshape(-1), grid.v.reshape(-1, grid.m.ndim), at, matter.phi,
+                          matter.G))
     _separate_all(*sides, law, tuple(range(one[0].m.ndim)))
-
-
-def flat(grid):
-    """Return the masses (n,) and velocities (n, d) of all nodes of a grid."""
-    return grid.m.reshape(-1), grid.v.reshape(-1, grid.m.ndim)
 
 
 # the nodes, and the matter near them

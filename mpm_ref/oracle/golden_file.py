@@ -134,7 +134,8 @@ def is_golden(path):
 
 def require_recordable(problem):
     """Raise ValueError for names of bodies that cannot name groups of the file, for averaged
-    volumes, for conditions at surfaces, for contact of bodies, and for laws and flows that the plain twin does not have.
+    volumes, for conditions at surfaces, for contact of bodies, and for laws and flows that the
+    plain twin does not have.
     """
     names = [body.name for body in problem.bodies]
     clash = sorted(reserved_names(problem.integrator) & set(names))

@@ -271,7 +271,7 @@ class Walls(Record):
 
 
 class Contact(Record):
-    """How each two of some bodies touch (see `body_contact`); others move as one where they meet."""
+    """How each two of some bodies touch (see `body_contact`); others share velocities."""
 
     bodies: tuple[Name, ...]                    # names
     friction: Friction = 0.0
