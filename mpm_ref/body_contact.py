@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from math import inf
 
-from .core.body_contact import Cloud, glue, keep_apart, shared_nodes
+from .core.body_contact import BodyPoints, apply_contact, glue, shared_nodes
 from .core.grid import Storage, update
 from .explicit import Stepper, scatter
 
@@ -132,8 +132,8 @@ class ContactStepper(Stepper):
             if rule is None or rule.kind == "stick":
                 glue(a[0], b[0], nodes)
             else:
-                sides = [(grid, clouds(field)) for grid, field in (a, b)]
-                keep_apart(*sides, nodes, (rule.friction, dt), self.scheme.stencil)
+                sides = [(grid, points_of(field)) for grid, field in (a, b)]
+                apply_contact(*sides, nodes, (rule.friction, dt), self.scheme.stencil)
 
     def constrain(self, grids, t, dt):
         """Apply the conditions to all grids, in the step from time t [s] by dt [s]."""
@@ -146,6 +146,6 @@ class ContactStepper(Stepper):
             super().update_particles(field, grid, dt)
 
 
-def clouds(bodies):
-    """Return the `Cloud` of each body."""
-    return [Cloud(q.x, q.V0, q.F) for q in (body.particles for body in bodies)]
+def points_of(bodies):
+    """Return the `BodyPoints` of each body."""
+    return [BodyPoints(q.x, q.V0, q.F) for q in (body.particles for body in bodies)]

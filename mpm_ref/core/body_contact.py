@@ -48,7 +48,7 @@ class Shared(NamedTuple):
     second: np.ndarray      # (K,)
 
 
-class Cloud(NamedTuple):
+class BodyPoints(NamedTuple):
     """Particles of a body."""
 
     x: np.ndarray           # (N, d)     position [m]
@@ -56,8 +56,8 @@ class Cloud(NamedTuple):
     F: np.ndarray           # (N, d, d)  deformation gradient, or (N,) its determinant
 
 
-class Matter(NamedTuple):
-    """The matter of a field near K nodes."""
+class VolumeShare(NamedTuple):
+    """The share of space that a field fills near K nodes."""
 
     slot: np.ndarray        # (n1, .., nd)  which of them a node of the grid is, or -1
     phi: np.ndarray         # (K,)          the share of space that it fills
@@ -70,7 +70,7 @@ class Side(NamedTuple):
     m: np.ndarray           # (n,)    mass of all its nodes [kg]
     v: np.ndarray           # (n, d)  velocity, which contact changes [m/s]
     node: np.ndarray        # (K,)    which of them
-    phi: np.ndarray         # (K,)    see `Matter`
+    phi: np.ndarray         # (K,)    see `VolumeShare`
     G: np.ndarray           # (K, d)
 
 
@@ -88,17 +88,17 @@ def glue(a, b, nodes):
         _stick_all(*sides, tuple(range(d)))
 
 
-def keep_apart(one, two, nodes, law, stencil):
+def apply_contact(one, two, nodes, law, stencil):
     """Change the velocities of two fields at `Shared` nodes by contact.
 
-    one and two are pairs of a grid and the clouds of its particles; law is the coefficient of
+    one and two are pairs of a grid and the `BodyPoints` of its bodies; law is the coefficient of
     friction and the length of the step [s].
     """
     sides = []
-    for (grid, clouds), at in zip((one, two), nodes, strict=True):
-        matter = matter_near(at, clouds, grid, stencil)
-        sides.append(Side(grid.m.reshape(-1), grid.v.reshape(-1, grid.m.ndim), at, matter.phi,
-                          matter.G))
+    for (grid, bodies), at in zip((one, two), nodes, strict=True):
+        shares = shares_near(at, bodies, grid, stencil)
+        sides.append(Side(grid.m.reshape(-1), grid.v.reshape(-1, grid.m.ndim), at, shares.phi,
+                          shares.G))
     _separate_all(*sides, law, tuple(range(one[0].m.ndim)))
 
 
@@ -115,22 +115,23 @@ def shared_nodes(a, b):
     return Shared(*(np.ravel_multi_index(at - g.origin[:, None], g.m.shape) for g in (a, b)))
 
 
-def matter_near(nodes, clouds, grid, stencil):
-    """Return the `Matter` near nodes (K,), indices in a grid's flattened arrays, of the clouds
-    whose grid it is.
+def shares_near(nodes, bodies, grid, stencil):
+    """Return the `VolumeShare` at nodes (K,), indices in a grid's flattened arrays, of the bodies
+    whose grid it is, a list of `BodyPoints`.
     """
     d = grid.m.ndim
-    matter = Matter(np.full(grid.m.shape, -1), np.zeros(len(nodes)), np.zeros((len(nodes), d)))
-    matter.slot.reshape(-1)[nodes] = np.arange(len(nodes))
+    shares = VolumeShare(np.full(grid.m.shape, -1), np.zeros(len(nodes)),
+                         np.zeros((len(nodes), d)))
+    shares.slot.reshape(-1)[nodes] = np.arange(len(nodes))
     bases = bases_of(nodes, grid.m.shape, stencil)
-    for cloud in clouds:
-        marks = np.empty(len(cloud.x), dtype=np.bool_)
-        _mark_all(cloud.x, grid, stencil, bases, marks)
-        near = Cloud(*(a[marks] for a in cloud))
+    for points in bodies:
+        marks = np.empty(len(points.x), dtype=np.bool_)
+        _mark_all(points.x, grid, stencil, bases, marks)
+        near = BodyPoints(*(a[marks] for a in points))
         slabs = slabs_of(near.x, grid, stencil)
         for color in (0, 1):
-            _collect_color(near, grid, stencil, slabs, matter, color)
-    return matter
+            _collect_color(near, grid, stencil, slabs, shares, color)
+    return shares
 
 
 def bases_of(nodes, shape, stencil):
@@ -144,7 +145,7 @@ def bases_of(nodes, shape, stencil):
 
 @kernel
 def mark(x, grid, stencil, bases, marks, bounds):
-    """Whether the base node of each of the particles bounds[0] .. bounds[1] - 1 is in a mask."""
+    """Mark those of the particles bounds[0] .. bounds[1] - 1 whose base node is in a mask."""
     d = grid.m.shape
     for p in range(bounds[0], bounds[1]):
         base, _ = locate(vec(x, p, d), grid, stencil)
@@ -152,23 +153,23 @@ def mark(x, grid, stencil, bases, marks, bounds):
 
 
 @kernel
-def collect(cloud, grid, stencil, members, matter):
+def collect(points, grid, stencil, members, shares):
     """phi_i += w_ip V_p/dx^d, G_i -= V_p dw_ip/dx^d for the particles listed in `members` and the
     nodes that have a slot.
     """
     d = grid.m.shape
     for p in members:
-        base, s = locate(vec(cloud.x, p, d), grid, stencil)
+        base, s = locate(vec(points.x, p, d), grid, stencil)
         w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
-        share = cloud.V0[p] * abs(volume_ratio(cloud.F, p, d)) / grid.dx ** len(d)
+        share = points.V0[p] * abs(volume_ratio(points.F, p, d)) / grid.dx ** len(d)
         for c in range(columns(s, stencil)):
             k = column(c, stencil, d)
             for l in range(len(stencil)):
-                i = matter.slot[node(base, k, l)]
+                i = shares.slot[node(base, k, l)]
                 if i >= 0:
-                    matter.phi[i] += share * product(k, l, w)
+                    shares.phi[i] += share * product(k, l, w)
                     dw_ip = gradient(k, l, w, dw, grid.dx)
-                    put_vec(matter.G, i, lin(1.0, vec(matter.G, i, d), -share, dw_ip))
+                    put_vec(shares.G, i, lin(1.0, vec(shares.G, i, d), -share, dw_ip))
 
 
 @kernel
@@ -241,11 +242,11 @@ def _mark_all(x, grid, stencil, bases, marks):
 
 
 @parallel
-def _collect_color(cloud, grid, stencil, slabs, matter, color):
+def _collect_color(points, grid, stencil, slabs, shares, color):
     for h in prange((len(slabs.start) - color) // 2):
         a = 2 * h + color
         members = slabs.order[slabs.start[a] : slabs.start[a + 1]]
-        collect(cloud, grid, stencil, members, matter)
+        collect(points, grid, stencil, members, shares)
 
 
 @parallel

@@ -34,16 +34,16 @@ def normal_and_gap(phi, G):
     return difference / slope, 2 * (1 - phi[0] - phi[1]) / slope
 
 
-def velocities_after(m, v, n, free, mu):
+def velocities_after(m, v, n, gap_speed, mu):
     """Return the velocities of both bodies at one node after contact.
 
     m and v are their masses [kg] and velocities (d,) [m/s], n the normal from body 1 to body 2,
-    free [m/s] the speed with which they may approach, mu the coefficient of friction.
+    gap_speed [m/s] that with which the gap would close in the step, mu the coefficient of friction.
     """
     total = m[0] + m[1]
     mean = (m[0] * v[0] + m[1] * v[1]) / total
     closing = n @ (v[0] - v[1])
-    lost = closing - max(free, 0)
+    lost = closing - max(gap_speed, 0)
     if not lost > 0:
         return list(v)
     sliding = v[0] - v[1] - closing * n

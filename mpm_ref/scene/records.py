@@ -270,8 +270,8 @@ class Walls(Record):
     friction: Friction = 0.0
 
 
-class Contact(Record):
-    """How each two of some bodies touch (see `body_contact`); others share velocities."""
+class BodyContact(Record):
+    """The rule between each two of some bodies (see `body_contact`); others share velocities."""
 
     bodies: tuple[Name, ...]                    # names
     friction: Friction = 0.0
@@ -365,7 +365,7 @@ class Scene(Record, dict=True):
     fixed: tuple[Fixed, ...] = ()
     walls: Walls | None = None
     boundary: Literal["nodes", "surface"] = "nodes"     # where the conditions of colliders hold
-    contact: tuple[Contact, ...] = ()           # of bodies with each other
+    contact: tuple[BodyContact, ...] = ()           # of bodies with each other
     clip: Clip | None = None
     limits: Limits = Limits()
     quantity: tuple[Quantities, ...] = ()       # of interest; no run depends on them

@@ -7,13 +7,13 @@ from threads import by_threads
 
 from mpm_ref.body import particles_at
 from mpm_ref.core.body_contact import (
-    Cloud,
+    BodyPoints,
     Side,
+    apply_contact,
     glue,
-    keep_apart,
-    matter_near,
     normal_and_gap,
     shared_nodes,
+    shares_near,
 )
 from mpm_ref.core.grid import Storage, update
 from mpm_ref.core.order import slabs_of
@@ -64,7 +64,7 @@ def pressed(rng, d, noise=0.4):
 
 
 def cloud(q):
-    return Cloud(q.x, q.V0, q.F)
+    return BodyPoints(q.x, q.V0, q.F)
 
 
 def touched(fields, mu=MU, degree=2):
@@ -72,7 +72,7 @@ def touched(fields, mu=MU, degree=2):
     before, after = ([grid_of_field(q, degree) for q in fields] for _ in range(2))
     nodes = shared_nodes(*after)
     sides = [(grid, [cloud(q)]) for grid, q in zip(after, fields, strict=True)]
-    keep_apart(*sides, nodes, (mu, DT), STENCILS[degree])
+    apply_contact(*sides, nodes, (mu, DT), STENCILS[degree])
     return before, after, nodes
 
 
@@ -82,7 +82,7 @@ def geometry(fields, degree=2):
     nodes = shared_nodes(*grids)
     sides = []
     for grid, q, at in zip(grids, fields, nodes, strict=True):
-        near = matter_near(at, [cloud(q)], grid, STENCILS[degree])
+        near = shares_near(at, [cloud(q)], grid, STENCILS[degree])
         sides.append(Side(grid.m, grid.v, at, near.phi, near.G))
     rows = [normal_and_gap(*sides, k, tuple(range(d))) for k in range(len(nodes.first))]
     x = positions(grids[0]).reshape(-1, d)[nodes.first]

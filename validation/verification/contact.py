@@ -72,7 +72,7 @@ def touching(dx, gravity, mu=0.0, conditions=None):
     return ContactStepper((contact,), Scheme(), dx, np.asarray(gravity), conditions)
 
 
-def held(dx):
+def fixed_base(dx):
     """Return the condition that holds the lowest nodes, those at y <= 0."""
     return Conditions(walls=BoxWalls((None, 1), (None, None), "sticky"))
 
@@ -106,9 +106,9 @@ def settle(bodies, stepper, length, waits=8.0):
 # the cases
 
 class Impact(NamedTuple):
-    """What a head-on impact of two disks shows."""
+    """The measures of a head-on impact of two disks."""
 
-    kept: float         # speed afterwards over speed before
+    restitution: float  # speed afterwards over speed before
     duration: float     # [s] in which the middle 0.96 of the change of speed comes about
     gap: float          # between the circles at the first change [cells]
     drift: float        # of momentum, over that of one disk
@@ -146,11 +146,11 @@ def impact(cells, kind="separate"):
 
 
 def before_wall(cells):
-    """Return the speed kept and the duration of a disk before a wall, extrapolated to dx = 0 from
-    the grids of cells/2 and cells, with errors in dx.
+    """Return restitution and duration of the impact of a disk on a wall, extrapolated to dx = 0
+    from the grids of cells/2 and cells, with errors in dx.
     """
     coarse, fine = (impact(n, "wall") for n in (cells // 2, cells))
-    return 2.0 * fine.kept - coarse.kept, 2.0 * fine.duration - coarse.duration
+    return 2.0 * fine.restitution - coarse.restitution, 2.0 * fine.duration - coarse.duration
 
 
 def upon_block(cells, theta=0.0):
@@ -160,7 +160,7 @@ def upon_block(cells, theta=0.0):
     dx = 0.8 / cells
     lower = block("lower", (0.0, 0.0), (2.4, 0.4), dx / PER)
     upper = block("upper", (0.4, 0.4), (1.2, 0.8), dx / PER)
-    stepper = touching(dx, (G * sin(theta), -G * cos(theta)), RUBBING, held(dx))
+    stepper = touching(dx, (G * sin(theta), -G * cos(theta)), RUBBING, fixed_base(dx))
     settle([lower, upper], stepper, 0.8)
     return [lower, upper], stepper
 
@@ -194,7 +194,7 @@ def roll(cells, per):
     lower = block("lower", (0.0, 0.0), (1.6, 0.2), dx / per, law)
     upper = disk("upper", (0.5, 0.2 + radius), radius, dx / per, law)
     down = G * np.array([sin(theta), -cos(theta)])
-    stepper = touching(dx, (0.0, down[1]), 0.5, held(dx))
+    stepper = touching(dx, (0.0, down[1]), 0.5, fixed_base(dx))
     settle([lower, upper], stepper, 0.8)
     start, stepper.gravity = mean(upper, "x")[0], down
     for _ in move([lower, upper], stepper, duration):
@@ -202,7 +202,7 @@ def roll(cells, per):
     return (mean(upper, "x")[0] - start) / (down[0] / 3.0 * duration**2) - 1.0
 
 
-class Stack(NamedTuple):
+class StackErrors(NamedTuple):
     """Errors of a stack of two blocks [cells]."""
 
     depth: float        # of the upper face of the lower block
@@ -210,8 +210,8 @@ class Stack(NamedTuple):
 
 
 def stack(cells, offset, fall=0.4):
-    """Return the `Stack` of two blocks of 0.5 m, whose faces lie `offset` cells above nodes; the
-    upper one has fallen by `fall` cells.
+    """Return the `StackErrors` of two blocks of 0.5 m, whose faces lie `offset` cells above nodes;
+    the upper one has fallen by `fall` cells.
     """
     dx, height = 0.5 / cells, 1.0
     lower = block("lower", (0.0, offset * dx), (0.8, 0.5 + offset * dx), dx / PER)
@@ -229,7 +229,7 @@ def stack(cells, offset, fall=0.4):
     sunk = [-RHO * G * (height * y - 0.5 * y**2) / stiffness(LAW) for y in (y0, y0 + 2.0 * half)]
     ends = (lower.particles.x[top, 1].mean(), upper.particles.x[bottom, 1].mean())
     depth = ends[0] - Y[0].max() - sunk[0]
-    return Stack(depth / dx, (ends[1] - ends[0] - 2.0 * half - sunk[1] + sunk[0]) / dx)
+    return StackErrors(depth / dx, (ends[1] - ends[0] - 2.0 * half - sunk[1] + sunk[0]) / dx)
 
 
 class LoadedNodes(ContactStepper):
@@ -254,7 +254,7 @@ def press(cells, share):
     P = pi * E * (share * R)**2 / (8.0 * R * (1.0 - NU**2))
     weight = P / (RHO * pi * R**2)
     stepper = LoadedNodes((BodyContact(("lower", "upper")),), Scheme(), dx,
-                          np.array([0.0, -weight]), held(dx))
+                          np.array([0.0, -weight]), fixed_base(dx))
     settle([lower, upper], stepper, 1.8)
     rows = [(t, stepper.load.sum(axis=1)) for t in move([lower, upper], stepper, 0.1)]
     load = np.sum([row for _, row in rows], axis=0)
@@ -302,11 +302,11 @@ def record_impact(run, sizes):
     """Record speed, duration and first distance of two disks; and of disks that stick."""
     found = [impact(n) for n in sizes]
     one, scale = found[-1], f"{sizes[-1]} cells to the radius, {SPEED / SOUND:g} of sound each"
-    kept, duration = before_wall(sizes[-1])
+    speed, duration = before_wall(sizes[-1])
     record(run, "impact.momentum", one.drift, **at_most(1e-12), scale=scale,
            note="of one disk's; impulses on both are opposite")
-    record(run, "impact.speed", one.kept / kept - 1.0, **band(0.02), scale=scale,
-           note=f"kept after separation, against {kept:.4g} of a disk before a wall at its "
+    record(run, "impact.restitution", one.restitution / speed - 1.0, **band(0.02), scale=scale,
+           note=f"of speed, against {speed:.4g} of a disk before a wall at its "
                 "surface, extrapolated; bound: an aim")
     record(run, "impact.duration", one.duration / duration - 1.0, **band(0.05), scale=scale,
            note=f"against {duration:.4g} s before that wall; bound: an aim")
@@ -316,7 +316,7 @@ def record_impact(run, sizes):
     glued = impact(sizes[-1], "stick")
     record(run, "impact.stick.gap", glued.gap, unit="dx", comparator="info", scale=scale,
            note='the same with kind = "stick", as in one field')
-    run.table("impact", ("cells", "kept", "duration", "gap"),
+    run.table("impact", ("cells", "restitution", "duration", "gap"),
               [(n, *row[:3]) for n, row in zip(sizes, found, strict=True)])
 
 

@@ -29,7 +29,7 @@ def test_the_half_width_of_hertz_loads_is_found(center):
 def test_disks_bounce_and_glued_ones_feel_each_other_early():
     free, glued = impact(4), impact(4, "stick")
     assert free.drift < 1e-13
-    assert 0.8 < free.kept < 1.0
+    assert 0.8 < free.restitution < 1.0
     assert abs(free.gap) < 0.2 < 1.0 < glued.gap
     assert 0.1 < free.duration * SPEED / 0.06 < 10.0
 
