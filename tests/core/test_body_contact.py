@@ -209,9 +209,10 @@ def test_volumes_are_those_of_the_deformed_bodies(rng):
 
 # nodes, glue, bits
 
-def test_bodies_far_apart_share_no_node(d, rng):
+@pytest.mark.parametrize("cells", [9.0, -9.0, 40.0])
+def test_bodies_far_apart_share_no_node(d, cells, rng):
     a, b = pressed(rng, d)
-    b.x[:] += 40.0 * DX
+    b.x[:] += cells * DX
     nodes = shared_nodes(grid_of_field(a), grid_of_field(b))
     assert len(nodes.first) == len(nodes.second) == 0
 

@@ -273,7 +273,7 @@ def half_width(x, load, dx):
 # the experiment
 
 @experiment("verification.contact", title="Contact of bodies: impact, slide, roll, stack, press",
-            profiles=("quick", "standard"), budget={"quick": 5, "standard": 60})
+            profiles=("quick", "standard"), budget={"quick": 6, "standard": 120})
 def contact(run):
     """Record each case on a coarse grid, or on finer ones too."""
     record_impact(run, run.choose(quick=(16,), standard=(8, 16, 32)))
@@ -327,8 +327,8 @@ def record_blocks(run, sizes):
     record(run, "slide.deceleration", rows[-1][1], **band(0.01), scale=scale,
            note=f"against mu g, mu = {RUBBING}, fitted to speeds of 0.25 s; bound: an aim")
     record(run, "hold.way", rows[-1][2], **at_most(0.01), scale=scale,
-           note=f"on a slope of {HELD:g} degrees, over the way without friction, which "
-                f"holds to {degrees(np.arctan(RUBBING)):.3g} degrees; bound: an aim")
+           note=f"on a slope of {HELD:g} degrees, over the way without friction; the angle of "
+                f"friction is {degrees(np.arctan(RUBBING)):.3g} degrees; bound: an aim")
     run.table("blocks", ("cells", "deceleration", "way"), rows)
 
 
