@@ -50,6 +50,7 @@ def test_bodies_touch_in_all_pairs():
 def test_a_scene_is_written_and_read_back():
     scene = loads(SCENE + CONTACT)
     assert loads(dumps(scene)) == scene
+    assert "[[contact]]" in dumps(scene)
     assert loads(canonical(scene)) == scene
     assert "contact" not in canonical(loads(SCENE))
 
@@ -102,5 +103,5 @@ def test_impulses_of_parts_are_those_of_all_bodies():
 def test_reduced_models_refuse_it():
     with pytest.raises(ValueError, match="has contact of bodies"):
         nsf_full_model(loads('scheme = { transfer = "apic" }' + SCENE + CONTACT))
-    with pytest.raises(ValueError, match="reduced runs know none"):
+    with pytest.raises(ValueError, match="more than one body: reduced runs know none"):
         ldm_full_model(loads('scheme = { transfer = "pic" }' + SCENE + CONTACT))

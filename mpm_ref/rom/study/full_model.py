@@ -46,8 +46,7 @@ class FullModel(NamedTuple):
 def ldm_full_model(scene):
     """Return the `FullModel` of a scene that LDM reduces. Raises ValueError for features that its
     reduced runs do not have: more bodies, plastic flow, an affine transfer, averaged volumes,
-    conditions at surfaces, contact of bodies, a velocity at the start, forces of single particles,
-    a box.
+    conditions at surfaces, a velocity at the start, forces of single particles, a box.
     """
     problem = build(scene)
     body = problem.bodies[0]
@@ -56,7 +55,6 @@ def ldm_full_model(scene):
                    f"the transfer {problem.scheme.transfer}": problem.scheme.transfer != "pic",
                    "averaged volumes (f_bar)": problem.scheme.f_bar,
                    'boundary = "surface"': isinstance(problem.conditions, SurfaceConditions),
-                   "contact of bodies": bool(problem.contacts),
                    "a start that moves": np.any(body.particles.v),
                    "forces of single particles": body.particles.b.ndim > 1,
                    "a box that clips": problem.clip is not None}
