@@ -44,6 +44,8 @@ class StepAdjoint:
             )
         if hasattr(stepper.conditions, "apply_at_surface"):
             raise ValueError(AT_NODES)
+        if stepper.contacts:
+            raise ValueError("contact of bodies has no adjoint: expected a Stepper without")
         if stepper.scheme.f_bar:
             raise ValueError("f_bar = True: averaged volumes have no adjoint; expected a scheme "
                              "with f_bar = False")

@@ -52,11 +52,11 @@ def fault_of(problem, stepper, state, grid, dt):
     if solve is not None and not (solve.converged or problem.allow_unstable):
         return f"the implicit step was not solved: {solve.message}"
     limit = (1.0 - SLACK) * problem.limits.cfl * problem.dx / dt
-    if speed_bound(grid, state.bodies) <= limit:
+    parts, scheme = stepper.parts(grid, state.bodies), stepper.scheme
+    if all(speed_bound(*part) <= limit for part in parts):
         return None
-    scheme = stepper.scheme
-    if all(largest_speed(body.particles, grid, scheme.stencil, scheme.share(dt)) <= limit
-           for body in state.bodies):
+    if all(largest_speed(body.particles, part, scheme.stencil, scheme.share(dt)) <= limit
+           for part, bodies in parts for body in bodies):
         return None
     return f"a particle crosses more than {problem.limits.cfl:g} dx in a step"
 

@@ -119,6 +119,7 @@ class Stepper:
     """
 
     implicit = False     # whether dt is free of the bounds of waves
+    contacts = ()        # of bodies with each other (see `body_contact`)
     report = None        # what a solver says of the last step: nothing was solved
 
     def __init__(self, scheme, dx, dim, gravity, conditions=None):
@@ -156,6 +157,10 @@ class Stepper:
         grid = self.accelerate(bodies, dt)
         self.constrain(grid, t, dt)
         return grid
+
+    def parts(self, grid, bodies):
+        """Return pairs of a grid of a step and the bodies that move with it."""
+        return [(grid, bodies)]
 
     def accelerate(self, bodies, dt):
         """Return the grid with the velocities that forces and gravity give it in dt [s]."""

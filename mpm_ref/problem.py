@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .body_contact import ContactStepper, check_contacts
 from .core.stencil import inverse_inertia
 from .energy_budget import BudgetStepper, EnergyBudget
 from .explicit import Scheme, Stepper
@@ -64,6 +65,7 @@ class Problem:
     solver: SolverOptions | None = None     # of an implicit step; None: HOT's
     strain_bounds: dict = field(default_factory=dict)   # {body: strains of its laws' training}
     budget: EnergyBudget | None = None  # to which an explicit run adds its steps
+    contacts: tuple = ()                # of BodyContact between bodies
 
     def __post_init__(self):
         if not self.bodies:
@@ -76,12 +78,27 @@ class Problem:
         if self.budget is not None and self.integrator != "explicit":
             raise ValueError(f"energy budget with the integrator {self.integrator!r}: expected "
                              "'explicit'")
+        self._check_contacts()
+
+    def _check_contacts(self):
+        if not self.contacts:
+            return
+        check_contacts(self.contacts, [body.name for body in self.bodies], self.scheme)
+        if self.integrator != "explicit":
+            raise ValueError(f"contacts with the integrator {self.integrator!r}: expected "
+                             "'explicit', since their forces have no potential")
+        if self.budget is not None:
+            raise ValueError("energy budget with contacts of bodies: it has no term for their "
+                             "work; expected a run without it")
 
     def stepper(self):
         """Return a new stepper of the integrator. Raises ValueError for one that does not exist."""
         what = self.scheme, self.dx, self.dim, self.gravity, self.conditions
         if self.budget is not None:
             return BudgetStepper(self.budget, *what)
+        if self.contacts:
+            return ContactStepper(self.contacts, self.scheme, self.dx, self.gravity,
+                                  self.conditions)
         if self.integrator == "explicit":
             return Stepper(*what)
         if self.integrator == "implicit":

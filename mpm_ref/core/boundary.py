@@ -172,6 +172,10 @@ class Conditions:
         """
         return solve(*self.touched(grid, t, dt), grid)
 
+    def apply_all(self, grids, t, dt):
+        """Apply to the grids of several velocity fields; returns the sums of the impulses."""
+        return sum(self.apply(grid, t, dt) for grid in grids)
+
     def touched(self, grid, t, dt):
         """Return three lists with an entry for each part: its `Touch` at time t, rule and friction.
 

@@ -6,7 +6,8 @@
     density     density of all bodies
     speed       initial velocities, and all displacements of parts in the times that they have
     gravity     gravity
-    friction    tangent of the friction angle of all flows, and friction of colliders and walls
+    friction    tangent of the friction angle of all flows, and friction of colliders, walls
+                and contacts
     yield       sigma_y and tau_y of all flows
     particles   points per cell and axis, whole numbers
     size        all lengths (see `geometry`); velocities, gravity and times stay
@@ -123,9 +124,15 @@ def scale_poisson(tables, factor, size):
             body["material"]["nu"] = 0.5 - 0.5 * factor * (1.0 - 2.0 * nu)
 
 
+def rubbing(tables):
+    """Return the tables that may have a friction: colliders, regions, walls, contacts."""
+    return (*tables["collider"], *tables["fixed"], tables.get("walls") or {},
+            *tables.get("contact", ()))
+
+
 def scale_friction(tables, factor, size):
-    """Multiply the tangent of all friction angles, and the friction of colliders and walls."""
-    for part in (*tables["collider"], *tables["fixed"], tables.get("walls") or {}):
+    """Multiply the tangent of all friction angles, and the friction of parts and contacts."""
+    for part in rubbing(tables):
         multiply(part, ("friction",), factor)
     for body in tables["body"]:
         angle = body["material"]["flow"].get("friction_angle")
@@ -214,8 +221,7 @@ def flow_reading(*keys):
 
 def friction_reading(tables):
     """Return the first friction angle, or else the friction of the first part that has some."""
-    parts = (*tables["collider"], *tables["fixed"], tables.get("walls") or {})
-    frictions = [part["friction"] for part in parts if part.get("friction")]
+    frictions = [part["friction"] for part in rubbing(tables) if part.get("friction")]
     return (flow_reading("friction_angle")(tables)
             or (f"friction = {frictions[0]:.6g}" if frictions else ""))
 

@@ -96,7 +96,7 @@ def removals_of(scene):
     """Return the removals that a scene with named parts offers, a tuple of `Removal`: first those
     that save time, last those that may cost some.
     """
-    return (*part_removals(scene), *load_removals(scene),
+    return (*part_removals(scene), *contact_removals(scene), *load_removals(scene),
             *(removal for body in scene.body for removal in body_removals(scene, body)),
             *boundary_removals(scene), *resolution_removals(scene), *scheme_removals(scene))
 
@@ -194,7 +194,7 @@ def body_removals(scene, body):
     """Yield the removals of a body, of its velocity and of its material's ingredients."""
     k, name, material = scene.body.index(body), body.name, body.material
     if len(scene.body) > 1:
-        yield Removal(f"body {name}", lambda tables: tables["body"].pop(k), body=name)
+        yield Removal(f"body {name}", body_edit(k), body=name)
     if body.velocity.moves:
         yield Removal(f"initial velocity of {name}",
                       lambda tables: tables["body"][k].pop("velocity"))
@@ -210,6 +210,16 @@ def body_removals(scene, body):
         fluid = {"law": "fluid", "lam": bulk_response(material, scene.dim), "E": None, "nu": None}
         yield Removal(f"tensor F of {name}", material_edit(k, **fluid, flow={"type": "none"}),
                       "J of a fluid")
+
+
+def body_edit(k):
+    """Return the edit that takes body k away, and its contacts."""
+    def edit(tables):
+        name = tables["body"].pop(k)["name"]
+        for contact in tables["contact"]:
+            contact["bodies"] = [other for other in contact["bodies"] if other != name]
+        tables["contact"] = [contact for contact in tables["contact"] if len(contact["bodies"]) > 1]
+    return edit
 
 
 def material_edit(k, **values):
@@ -255,6 +265,17 @@ def part_removals(scene):
             yield Removal("friction of walls", default_edit("walls", "friction"))
     if scene.clip is not None:
         yield Removal("clip", lambda tables: tables.pop("clip"))
+
+
+def contact_removals(scene):
+    """Yield the removals of contacts of bodies, which one velocity field replaces, and of their
+    friction.
+    """
+    for k, contact in enumerate(scene.contact):
+        bodies = ", ".join(contact.bodies)
+        yield Removal(f"contact of {bodies}", item_edit("contact", k), "one velocity field")
+        if contact.friction:
+            yield Removal(f"friction of {bodies}", item_edit("contact", k, "friction"))
 
 
 def item_edit(key, k, inner=None):

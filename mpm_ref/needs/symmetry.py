@@ -29,7 +29,7 @@ def mirror_removals(scene, axes):
     for axis in range(scene.dim):
         c = float(middle[axis])
         sides = body_sides(scene, bodies, axis, c)
-        if sides is None or not is_symmetric(scene, axis, c):
+        if sides is None or not is_symmetric(scene, axis, c) or parts_a_contact(scene, sides):
             continue
         images = part_images(scene, samples_around(x, axis, c), axis)
         if None not in images.values():
@@ -39,6 +39,12 @@ def mirror_removals(scene, axes):
             letter = AXES[axes[axis]]
             yield Removal(f"half {letter} < {c:.6g} m", half_edit(sides, axis, c, letter),
                           "symmetry wall", half=Half(axis, c, tuple(halved)))
+
+
+def parts_a_contact(scene, sides):
+    """Return whether a body that is on one side of the plane has a contact: no wall replaces it."""
+    return any(side != 0 and body.name in contact.bodies
+               for contact in scene.contact for side, body in zip(sides, scene.body))
 
 
 def is_symmetric(scene, axis, c):

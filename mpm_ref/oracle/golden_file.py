@@ -134,7 +134,8 @@ def is_golden(path):
 
 def require_recordable(problem):
     """Raise ValueError for names of bodies that cannot name groups of the file, for averaged
-    volumes, for conditions at surfaces, and for laws and flows that the plain twin does not have.
+    volumes, for conditions at surfaces, for contact of bodies, and for laws and flows that the
+    plain twin does not have.
     """
     names = [body.name for body in problem.bodies]
     clash = sorted(reserved_names(problem.integrator) & set(names))
@@ -145,6 +146,9 @@ def require_recordable(problem):
                          f"{problem.integrator} step in the file; rename the body")
     if hasattr(problem.conditions, "apply_at_surface"):
         raise ValueError(AT_NODES)
+    if problem.contacts:
+        raise ValueError("contact of bodies: golden files have one velocity field; expected a "
+                         "scene without it")
     if problem.scheme.f_bar:
         raise ValueError("f_bar = true: golden files have no arrays of averaged volumes; expected "
                          "a scene with f_bar = false")

@@ -10,6 +10,6 @@ floating type, `np.longdouble` included.
 
 Read them in this order: `spline` (weights), `transfer` (the sums between particles and nodes),
 `laws` (elasticity), `flows` (plasticity), `boundary` (contact at the nodes), `surface` (contact
-between them), `step` (one explicit step), `potential` (what an implicit step minimises); `tensors`
-has the singular value decomposition.
+between them), `body_contact` (of bodies with each other), `step` (one explicit step), `potential`
+(what an implicit step minimises); `tensors` has the singular value decomposition.
 """

@@ -42,6 +42,7 @@ from .quantity_records import (
 from .records import (
     Arrays,
     Body,
+    BodyContact,
     Clip,
     Collider,
     Fixed,
@@ -64,6 +65,7 @@ from .toml import canonical, digest, dumps, load, loads
 __all__ = [
     "Arrays",
     "Body",
+    "BodyContact",
     "Box",
     "Capsule",
     "CentroidQuantity",

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..body import AFFINE, Body, particles_at, with_separate_gradient
+from ..body_contact import BodyContact, check_contacts
 from ..core import motion as rigid
 from ..core.boundary import BoxWalls, Conditions, Prescribed
 from ..core.boundary import Collider as RigidCollider
@@ -39,6 +40,7 @@ class SceneParts(NamedTuple):
     limits: Limits
     conditions: Conditions | None
     solver: object              # `hot.methods.Options`; None for the explicit integrator
+    contacts: tuple             # of BodyContact between bodies
     materials: tuple            # of (law, flow) for each body; None where a file holds them
 
 
@@ -46,7 +48,7 @@ def build_parts(scene):
     """Return the `SceneParts` of a scene. Raises SceneError for a part that cannot be built."""
     materials = tuple(build_material(body, scene.dim, k) for k, body in enumerate(scene.body))
     return SceneParts(build_clock(scene), build_limits(scene), build_conditions(scene),
-                      build_solver(scene), tuple(
+                      build_solver(scene), build_contacts(scene), tuple(
                           None if record.material.is_neural else (law, flow)
                           for record, (law, flow, _) in zip(scene.body, materials)))
 
@@ -219,6 +221,9 @@ def build_solver(scene):
     if scene.boundary != "nodes":
         raise SceneError(f"boundary = {scene.boundary!r}: expected \"nodes\" with an implicit "
                          "integrator, whose constraints hold at nodes")
+    if scene.contact:
+        raise SceneError("contact: expected none with an implicit integrator, whose bodies have "
+                         "one velocity field")
     return options_of(scene.integrator, **(scene.solver.given() if scene.solver else {}))
 
 
@@ -240,6 +245,16 @@ def build_conditions(scene):
         return None
     conditions = SurfaceConditions if scene.boundary == "surface" else Conditions
     return conditions(colliders, prescribed, walls)
+
+
+def build_contacts(scene):
+    """Return the contacts of bodies with each other."""
+    contacts, names = [], [body.name for body in scene.body]
+    for k, record in enumerate(scene.contact):
+        with errors_at(f"contact[{k}]"):
+            contacts.append(BodyContact(record.bodies, record.friction, record.kind))
+            check_contacts(contacts, names, scene.step_scheme)
+    return tuple(contacts)
 
 
 def _collider(record, dim, path):

@@ -57,7 +57,7 @@ def problem_from_arrays(bodies, dx, **keys):
 
 
 def _problem_of(scene, arrays):
-    (clock, limits, conditions, solver, _), clip = scene.parts, scene.clip
+    (clock, limits, conditions, solver, contacts, _), clip = scene.parts, scene.clip
     bodies, strain_bounds = build_bodies(scene, arrays)
     return Problem(
         bodies=bodies,
@@ -74,6 +74,7 @@ def _problem_of(scene, arrays):
         integrator="explicit" if solver is None else "implicit",
         solver=solver,
         strain_bounds=strain_bounds,
+        contacts=contacts,
     )
 
 

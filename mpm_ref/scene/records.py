@@ -270,6 +270,14 @@ class Walls(Record):
     friction: Friction = 0.0
 
 
+class BodyContact(Record):
+    """The rule between each two of some bodies (see `body_contact`); others share velocities."""
+
+    bodies: tuple[Name, ...]                    # names
+    friction: Friction = 0.0
+    kind: Literal["separate", "stick"] = "separate"
+
+
 class Clip(Record):
     """A box in which the particles' positions are kept, their velocities unchanged (NCLAW-sim)."""
 
@@ -357,6 +365,7 @@ class Scene(Record, dict=True):
     fixed: tuple[Fixed, ...] = ()
     walls: Walls | None = None
     boundary: Literal["nodes", "surface"] = "nodes"     # where the conditions of colliders hold
+    contact: tuple[BodyContact, ...] = ()           # of bodies with each other
     clip: Clip | None = None
     limits: Limits = Limits()
     quantity: tuple[Quantities, ...] = ()       # of interest; no run depends on them

@@ -21,7 +21,13 @@ class ImpulseRecorder:
 
     def apply(self, grid, t, dt):
         """Apply the conditions in the step of length dt [s] that ends at t [s]."""
-        J = self._conditions.apply(grid, t, dt)
+        return self._noted(self._conditions.apply(grid, t, dt), t, dt)
+
+    def apply_all(self, grids, t, dt):
+        """Apply the conditions to the grids of several velocity fields."""
+        return self._noted(self._conditions.apply_all(grids, t, dt), t, dt)
+
+    def _noted(self, J, t, dt):
         if J is not None:
             while self._steps and self._steps[-1][0] > t - dt + EVEN * dt:
                 self._steps.pop()           # of a step that was rejected

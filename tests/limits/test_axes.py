@@ -103,13 +103,14 @@ def test_axis_multiplies_its_keys_alone(sand, name, paths):
     assert ratios(sand, {name: 1.7}) == {path: pytest.approx(1.7) for path in paths}
 
 
-def test_friction_of_colliders_and_walls_is_an_axis():
+def test_friction_of_colliders_walls_and_contacts_is_an_axis():
     tables = {"body": [], "fixed": [], "collider": [{"friction": 0.2}, {"friction": 0.0}, {}],
-              "walls": {"friction": 0.5}}
+              "walls": {"friction": 0.5}, "contact": [{"friction": 0.1}]}
     assert AXIS["friction"].reading(tables) == "friction = 0.2"
     AXIS["friction"].change(tables, 2.0, 1.0)
     assert tables["collider"] == [{"friction": 0.4}, {"friction": 0.0}, {}]
     assert tables["walls"] == {"friction": 1.0}
+    assert tables["contact"] == [{"friction": 0.2}]
 
 
 def test_size_multiplies_lengths_alone(sand):

@@ -160,6 +160,31 @@ def test_names_by_place_stay_after_removals_and_are_unique():
     assert "collider collider1" in left.offers
 
 
+CONTACT = """
+[[contact]]
+bodies = ["block", "distant"]
+friction = 0.2
+"""
+
+
+def test_contact_of_bodies_is_an_ingredient():
+    label = "contact of block, distant (one velocity field instead)"
+    assert without(SCENE + CONTACT, label).contact == ()
+    assert changed_keys(SCENE + CONTACT, label) == {"contact"}
+    contact, = without(SCENE + CONTACT, "friction of block, distant").contact
+    assert (contact.bodies, contact.friction) == (("block", "distant"), 0.0)
+    assert not any("contact" in label for label in variant_of(SCENE).offers)
+
+
+def test_a_body_takes_its_contacts_along():
+    assert without(SCENE + CONTACT, "body distant").contact == ()
+    third = BLOCK.replace('"block"', '"third"').replace("[0.3, 0.1]", "[1.3, 0.1]").replace(
+        "[0.5, 0.3]", "[1.5, 0.3]")
+    three = SCENE + third + CONTACT.replace('"distant"]', '"distant", "third"]')
+    contact, = without(three, "body distant").contact
+    assert contact.bodies == ("block", "third")
+
+
 def test_conditions_at_the_surface_are_an_ingredient_where_there_are_colliders():
     label = "conditions at the surface (at nodes instead)"
     at_surface = 'boundary = "surface"\n' + EXTRAS

@@ -111,6 +111,12 @@ def test_unequal_pair_is_noticed(old, new):
     assert HALF_X not in halves(PAIR.replace(old, new))
 
 
+def test_a_body_in_contact_with_its_image_is_not_replaced_by_a_wall():
+    """It may leave the image, but not a wall that slips."""
+    assert HALF_X in halves(PAIR)
+    assert HALF_X not in halves(PAIR + '\n[[contact]]\nbodies = ["left", "right"]\n')
+
+
 def test_velocity_in_the_plane_is_symmetric():
     text = DISK.replace("radius = 0.2 }", "radius = 0.2 }\nvelocity = { linear = [0.0, -1.0] }")
     assert halves(text) == [HALF_X]

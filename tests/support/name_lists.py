@@ -9,7 +9,7 @@ _BUILT = "the record of a scene file, and the object of a run that it is built i
 SHARED_CLASS_NAMES: dict[str, str] = dict.fromkeys(
     ("HalfSpace", "Sphere", "Cylinder", "Capsule", "Torus", "Wedge", "Steady", "Keyframes", "Ramps",
      "Oscillation", "Motion", "Collider", "Box"), _KERNELS) | dict.fromkeys(
-    ("Body", "Scheme", "Limits"), _BUILT) | {
+    ("Body", "BodyContact", "Scheme", "Limits"), _BUILT) | {
     "Material": "the record of a scene file, and in `materials` the law and flow it is built into"}
 
 # Not even as one of the words of a name (`kept_bodies`, `HeldRun`; the plural counts as well).

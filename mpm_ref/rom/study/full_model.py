@@ -69,8 +69,8 @@ def ldm_full_model(scene):
 def nsf_full_model(scene):
     """Return the `FullModel` of a scene that NSF reduces. Raises ValueError for features that its
     reduced runs do not have: an implicit integrator, a transfer other than apic, its damping,
-    relaxation and added mass, averaged volumes, conditions at surfaces, a fluid, forces of single
-    particles, a box that clips.
+    relaxation and added mass, averaged volumes, conditions at surfaces, contact of bodies, a fluid,
+    forces of single particles, a box that clips.
     """
     problem = build(scene)
     particles = [body.particles for body in problem.bodies]
@@ -84,6 +84,7 @@ def nsf_full_model(scene):
         (problem.scheme.f_bar, "averaged volumes", "scheme.f_bar = false"),
         (isinstance(problem.conditions, SurfaceConditions), 'boundary = "surface"',
          'boundary = "nodes"'),
+        (bool(problem.contacts), "contact of bodies", "one velocity field"),
         (any(p.F.ndim == 1 for p in particles), "a fluid", "solids, which have a shear stress"),
         (any(p.b.ndim > 1 for p in particles), "forces of single particles", "gravity alone"),
         (problem.clip is not None, "a box that clips", "none"))
