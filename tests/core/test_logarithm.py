@@ -152,10 +152,11 @@ def test_what_has_no_strain_is_refused(d, rng):
 
 @pytest.mark.parametrize("size", [1e-3, 0.02, 0.2, 0.44])
 def test_strain_is_objective_and_isotropic(size, d, rng):
+    """Q is orthogonal to a few units of round-off, which depend on LAPACK and enter twice."""
     F = gradients(rng, size, d)
     eps, Q = strains(F)[0], rotations(rng, len(F), d)
-    assert np.abs(strains(Q @ F)[0] - Q @ eps @ transpose(Q)).max() < 2e-15
-    assert np.abs(strains(F @ Q)[0] - eps).max() < 2e-15
+    assert np.abs(strains(Q @ F)[0] - Q @ eps @ transpose(Q)).max() < 5e-15
+    assert np.abs(strains(F @ Q)[0] - eps).max() < 5e-15
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-9, 1e-3, SMALL * (1 - 1e-9), SMALL, 0.2, RADIUS])
