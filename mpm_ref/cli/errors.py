@@ -32,6 +32,7 @@ def exit_on_errors():
     """End the command on bad input, file errors and Ctrl-C; others keep their traceback as bugs."""
     try:
         yield
+        sys.stdout.flush()          # here a full disk is noticed, not at the interpreter's end
     except FAULTS as fault:
         end(fault, BAD_INPUT)
     except (NotWritten, SchedulerLost) as fault:
