@@ -13,6 +13,7 @@ from ..scene import build
 from ..scene.quantity_records import AXES, wall_name
 from ..shapes import level_set
 from .ingredients import MIRROR, Half, Removal
+from .plane import RATES
 
 NEAR = 1e-6             # cells within which points and distances are equal
 SAMPLES = 2000          # points at which a shape is compared with its image
@@ -115,7 +116,7 @@ def alike(part, other, axis, same):
     shift = part.motion.translation
     if not same or shift is None:
         return shift is None and other.motion.translation is None
-    key = next(name for name in ("rate", "values", "rates", "amplitude") if hasattr(shift, name))
+    key = next(name for name in RATES if hasattr(shift, name))
     return not np.atleast_2d(getattr(shift, key))[:, axis].any()
 
 

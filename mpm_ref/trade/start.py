@@ -7,11 +7,11 @@ face dx/2 and its centroid dx/4 away, so that most of that is a fault.
 import numpy as np
 
 from ..scene import build
+from ..scene.quantity_records import AXES
 from ..sweep.setting import scene_at, setting
 
 FACE, CENTROID = 0.4, 0.2       # dx of the scene as given by which they may be off
 FINE_ENOUGH = 0.25              # factor of dx of the reference's grid whose particles are taken
-AXES = "xyz"
 
 
 def start_fault(search, chosen):

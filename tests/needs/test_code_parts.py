@@ -102,6 +102,12 @@ def test_svd(law, flow, expected):
     assert svd_of(body_of(law, flow)) == expected
 
 
+def test_svd_in_every_step_where_stretches_are_lifted():
+    body = body_of("hencky", "von_mises")
+    lifted = body._replace(flow=body.flow._replace(s_min=0.95))
+    assert svd_of(lifted) == ALWAYS
+
+
 # stages and kernels, in a process of their own
 
 @pytest.fixture(scope="module")

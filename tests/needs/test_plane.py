@@ -1,14 +1,18 @@
 """A scene that is uniform along an axis moves as its section in 2D does, whichever the axis."""
 
+from types import SimpleNamespace
+
 import msgspec
 import numpy as np
 import pytest
 from needs_toys import runs_of, variant_of
 
+from mpm_ref.needs.answer import lean_text
 from mpm_ref.needs.plane import AXES, NotUniform, left_axes, prism
 from mpm_ref.needs.removal import RemovalStudy
 from mpm_ref.needs.variant import changes
-from mpm_ref.scene import SceneError
+from mpm_ref.scene import SceneError, loads
+from mpm_ref.scene.quantity_records import quantity_of
 from mpm_ref.shapes import Shape
 
 LENGTH = 0.15
@@ -140,6 +144,35 @@ def test_halves_and_sections_have_names_of_the_axes_at_first(order):
     assert [part.name for part in variant.scene.collider] == ["mirror z"]
     assert variant.quantity("force:wall z+") == "force:wall y+"
     assert variant.length == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(("removals", "factor"), [
+    ((), None), (("half z",), None), (("third dimension x",), 0.4),
+    (("half z", "third dimension x"), 0.8)])
+def test_the_lean_scene_says_the_factor_of_the_section(removals, factor):
+    first = variant_of(WALLED)
+    lean = first
+    for begin in removals:
+        lean = lean.without(offered(lean, begin))
+    result = SimpleNamespace(first=first, lean=lean, cpu=1.0, order=())
+    answer = SimpleNamespace(name="walled", error=0.01, command="mpm-ref needs", result=result)
+    text = lean_text(answer, ".")
+    assert ("those of the scene in 3D" in text) == (factor is not None)
+    assert factor is None or f"times {factor:g} m are" in text
+
+
+@pytest.mark.parametrize(("begin", "fault"), [
+    ("third dimension x", "along the axis that is removed"), ("half x", "of the half")])
+def test_the_lean_scene_names_a_quantity_that_went(begin, fault):
+    first = variant_of(WALLED)
+    lean = first.without(offered(first, begin))
+    result = SimpleNamespace(first=first, lean=lean, cpu=1.0, order=())
+    answer = SimpleNamespace(name="walled", error=0.01, command="mpm-ref needs", result=result)
+    text = lean_text(answer, ".", (quantity_of("front:x-"), quantity_of("front:z+")))
+    assert "No [[quantity]] front:x-: " in text
+    assert fault in text
+    kept = lean.quantity("front:z+")
+    assert [one.text for one in loads(text).quantity] == [kept]
 
 
 def test_half_of_each_axis_has_a_wall_of_its_own():
