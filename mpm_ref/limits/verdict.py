@@ -207,9 +207,9 @@ class CellJudge:
         return {cell: verdict for cell, verdict in verdicts.items() if verdict.is_right}
 
     def _by_fine_grids(self, runs):
-        """Compare cells with their physical problem at dx/2, the cheapest first."""
-        runs = dict(sorted(runs.items(), key=lambda item: item[1].cost.cpu))
-        fine, verdicts = self._companions(runs, FINE), {}
+        """Compare cells with their physical problem at dx/2, which runs for the cheapest first."""
+        cheapest_first = dict(sorted(runs.items(), key=lambda item: item[1].cost.cpu))
+        fine, verdicts = self._companions(cheapest_first, FINE), {}
         for cell, run in runs.items():
             reference = fine[physical(cell)]
             if reference.finished:

@@ -21,6 +21,7 @@ from mpm_ref.rom.sampling import draw
 from mpm_ref.rom.step import ReducedStepper, ldm_stepper
 
 DX, DT, STEPS, RHO = 0.17, 0.01, 6, 800.0
+ROUNDING = 1e-15        # of velocities [m/s] of about 0.1: a decoder rounds by its number of points
 LAW = FixedCorotated(3e3, 4e3)
 GRAVITY = np.array([1.0, -9.8, 3.0])
 
@@ -190,14 +191,14 @@ def learned(d, degree, n=400, **options):
 
 
 def test_neighbours_are_enough_for_the_samples(d, degree):
-    """The same bits as with all points, from a share of them."""
+    """The same velocities as with all points, from a share of them."""
     model, (_, latent) = learned(d, degree), swinging(d)
     model.step(latent, np.arange(400), 0.0, DT)
     everywhere = model.trial
     samples = np.sort(np.argsort(np.linalg.norm(cloud(d, 400) - 0.1, axis=1))[:4])
     _, report = model.step(latent, samples, 0.0, DT)
     assert report.points < 400
-    assert np.array_equal(model.trial, everywhere[samples])
+    np.testing.assert_allclose(model.trial, everywhere[samples], rtol=0.0, atol=ROUNDING)
 
 
 def test_gravity_gives_the_grid_its_momentum(d, degree):
