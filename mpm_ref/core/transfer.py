@@ -17,7 +17,7 @@ them. Which fields the particles and the grid carry (see `state`) selects the tr
 kernel is compiled.
 """
 
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .precision import converted, with_rounded_spacing
 from .relaxation import blend, blend_moment, moment, shift_spin
 from .state import affine, body_force, full, put_affine
@@ -223,7 +223,7 @@ def damp(C, rpic, like, bounds):
         put_mat(C, p, mlin(1.0 - 0.5 * rpic, A, -0.5 * rpic, transpose(A)))
 
 
-@parallel
+@parallel_if_many
 def _damp(C, damping, like):
     for c in prange(CHUNKS):
         damp(C, damping, like, chunk(c, len(C)))
