@@ -128,7 +128,9 @@ def scheme_removals(scene):
                       ("f_bar", "averaged volumes (F-bar)")):
         if getattr(scheme, key):
             yield Removal(name, default_edit("scheme", key))
-    if scheme.degree > (2 if scheme.transfer in AFFINE else 1):
+    if scheme.gimp:
+        yield Removal("averages over particles (GIMP)", degree_edit(1), "linear splines")
+    elif scheme.degree > (2 if scheme.transfer in AFFINE else 1):
         yield Removal(f"splines of degree {scheme.degree}", degree_edit(scheme.degree - 1),
                       f"degree {scheme.degree - 1}")
 
@@ -141,7 +143,7 @@ def transfer_edit(text):
 def degree_edit(degree):
     """Return the edit to splines of another degree."""
     def edit(tables):
-        tables["scheme"]["degree"] = degree
+        tables["scheme"] |= {"degree": degree, "gimp": 0.0}
     return edit
 
 
@@ -180,6 +182,8 @@ def remove_points(tables):
             scale_points(sampling, FEWER_POINTS, tables["dim"], per_cell=False)
         else:
             sampling["per_cell"] = max(sampling["per_cell"] - 1, 1)
+    if tables["scheme"].get("gimp"):
+        tables["scheme"]["gimp"] = max(tables["scheme"]["gimp"] - 1.0, 1.0)
 
 
 def step_explicitly(tables):
