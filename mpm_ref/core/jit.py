@@ -205,9 +205,9 @@ def by_type(name, position=-1):
     """A function `name(*arguments)` that calls the method registered for one argument's type.
 
     The type is that of ``arguments[position]``, a NamedTuple class, or `tuple` for any other tuple;
-    methods are added with ``f.method(Class, kernel)``. Compiled callers resolve the method when they are compiled, so
-    that it is inlined; and they are still cached on disk, which they are not when handed a kernel
-    as an argument. Raises TypeError for a type without a method.
+    methods are added with ``f.method(Class, kernel)``. Compiled callers resolve the method when
+    they are compiled, so that it is inlined; and they are still cached on disk, which they are not
+    when handed a kernel as an argument. Raises TypeError for a type without a method.
     """
     methods = {}
 

@@ -169,8 +169,8 @@ def check_scheme(scheme):
         raise ValueError("mass_eps and gravity_on_empty belong to explicit NCLaw scenes: leave "
                          "them out with an implicit integrator")
     if scheme.gimp:
-        raise ValueError(f"gimp = {scheme.gimp} with an implicit integrator: its matrices are those "
-                         "of splines; expected gimp = 0, or integrator = \"explicit\"")
+        raise ValueError(f"gimp = {scheme.gimp} with an implicit integrator: its matrices are "
+                         "those of splines; expected gimp = 0, or integrator = \"explicit\"")
     if scheme.f_bar:
         raise ValueError("f_bar = true with an implicit integrator: its energy has no averaged "
                          "volumes; expected f_bar = false, or integrator = \"explicit\"")

@@ -46,7 +46,7 @@ def test_averaged_volumes_are_refused(tmp_path):
 
 def test_gimp_is_refused(tmp_path):
     problem = replace(stretched(), scheme=Scheme(transfer="pic", gimp=2.0))
-    with pytest.raises(ValueError, match="gimp = 2.0: golden files have weights of splines"):
+    with pytest.raises(ValueError, match=r"gimp = 2.0: golden files have weights of splines"):
         oracle.record(problem, tmp_path / "golden.h5", 1)
 
 

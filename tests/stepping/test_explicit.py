@@ -126,7 +126,8 @@ FALLS = {"pic": Scheme(1, "pic"), "flip": Scheme(3, "flip"), "apic": Scheme(2, "
 def test_free_fall(transfer):
     """x = x_0 + v_0 t + g dt^2 n (n + 1)/2, to round-off, whatever the transfer."""
     scheme, d = FALLS[transfer], 3 if transfer == "mls" else 2
-    body = ball("stone", (0.11, 0.22, 0.33)[:d], JELLY, NoFlow(), transfer=scheme.transfer, radius=1.3)
+    body = ball("stone", (0.11, 0.22, 0.33)[:d], JELLY, NoFlow(), transfer=scheme.transfer,
+                radius=1.3)
     g, v = np.array([0.5, -9.8, 1.0])[:d], np.array([1.0, 2.0, -3.0])[:d]
     q = moving(body, v).particles
     if transfer == "pic":                       # as a body force instead of gravity

@@ -69,7 +69,7 @@ def test_knobs_change_what_they_name():
     for other in (setting(degree=2), setting(degree=1), setting(transfer="mls"), setting(gimp=0.0),
                   setting(integrator="hot-plus")):
         assert scene_at(smooth, other).scheme.gimp == 0.0
-    with pytest.raises(SceneError, match="gimp = 2.0 with transfer 'mls'"):
+    with pytest.raises(SceneError, match=r"gimp = 2.0 with transfer 'mls'"):
         scene_at(scene, setting(gimp=2.0))
     implicit = scene_at(scene, setting(integrator="hot-plus"))
     assert (implicit.integrator, implicit.step_scheme.transfer) == ("hot-plus", "apic")

@@ -156,13 +156,13 @@ def record_gimp(run, linear):
     p, rows = sweep(GIMP, CELLS, gimp=GIMP[2])
     run.table("errors-gimp", COLUMNS, rows)
     scale = f"{CELLS} cells per side, {CFL} of the CFL limit, one oscillation"
-    run.record("verification.mms.gimp.order", p, comparator=">=", bound=1.0, scale=scale,
-               note="at least first order [WallstedtGuilkey2008]: slopes are continuous, but "
+    run.record("verification.mms.gimp.order", p, comparator=">=", bound=0.8, scale=scale,
+               note="first order, as bands elsewhere have it, or more: slopes are continuous, but "
                     "particles of unchanged length leave gaps and overlaps where strain varies")
     run.record("verification.mms.gimp.gain", linear[-1][-1] / rows[-1][-1], comparator=">=",
-               bound=10.0, scale=f"{CELLS[-1]} cells per side, {CFL} of the CFL limit",
-               note="error of linear splines over that of GIMP on the finest grid; the bound is "
-                    "what first order against none makes of the ratio on the coarsest")
+               bound=12.0, scale=f"{CELLS[-1]} cells per side, {CFL} of the CFL limit",
+               note="error of linear splines over that of GIMP on the finest grid; half of what "
+                    "first order against none makes of 6, the ratio on the coarsest")
 
 
 def record_3d(run):
