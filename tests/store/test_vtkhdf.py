@@ -118,7 +118,7 @@ def test_the_grid_has_the_weights_of_the_scheme(tmp_path, gimp):
                 for key in (("x", 0), ("m",)))
     with h5py.File(tmp_path / "grid.vtkhdf") as h5:
         root = h5["VTKHDF"]
-        m_i = root["PointData/density"][0].astype(float).sum(axis=(0, 1)) * problem.dx**2
+        m_i = root["PointData/density"][0].astype(float).sum(axis=0) * problem.dx**2
         nodes = root.attrs["Origin"][0] + problem.dx * np.arange(len(m_i))
     ip = pairs(x, problem.dx, 2, gimp)
     expected = (m[:, None] * ip.w * (problem.dx * ip.node[..., 0]) ** 2).sum()
