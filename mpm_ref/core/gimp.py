@@ -1,8 +1,8 @@
 """The weights of uniform GIMP: linear splines averaged over the length of a particle.
 
-A particle at x stands for the interval [x - l, x + l] of each axis, whatever its deformation
-[Bardenhagen2004] [Steffen2008Choices]. Its weights are the averages of the linear splines over it:
-at most three nodes have one, and slopes are continuous where a particle crosses a node. With
+A particle at x stands for the interval [x - l, x + l] of each axis, whatever its strain
+[Bardenhagen2004] [SteffenWallstedt2008]. Its weights are the averages of the linear splines over
+it: at most three nodes have one, and slopes are continuous where a particle crosses a node. With
 l = dx/2 they are the quadratic B-splines.
 """
 
