@@ -76,6 +76,12 @@ def test_slopes_and_curvatures_are_derivatives(f, per_cell):
         assert rise == pytest.approx(np.array(derivative(f, stencil)), abs=1e-11)
 
 
+def test_curvatures_at_a_kink_are_those_from_above():
+    stencil = gimp_stencil(2.0)
+    assert curvatures(stencil.low, stencil) == (2.0, -4.0, 2.0)
+    assert not any(curvatures(stencil.high, stencil))
+
+
 @pytest.mark.parametrize("per_cell", NUMBERS)
 def test_weights_and_slopes_are_continuous_where_linear_slopes_jump(per_cell):
     """At nodes, half-way between them, and where a particle's end passes a node."""
