@@ -99,13 +99,21 @@ def test_weights_and_slopes_are_continuous_where_linear_slopes_jump(per_cell):
     assert linear[1] == -2.0
 
 
-@given(x=st.floats(0.0, 1.0), per_cell=st.integers(1, 6))
+def force_on_node(row, stencil):
+    """Of unit stress in particles at the places of a row [cells]."""
+    found = [around(y, stencil) for y in row]
+    return abs(sum(dw @ (nodes == 0) for nodes, _, dw in found))
+
+
+@given(x=st.floats(0.0, 1.0), per_cell=st.floats(1.0, 6.0))
 def test_equal_stress_has_no_force_where_particles_fill_space(x, per_cell):
-    """Slopes of touching particles telescope, wherever they lie; those of linear splines jump."""
-    row = x + np.arange(-4 * per_cell, 4 * per_cell) / per_cell
-    found = [around(y, gimp_stencil(float(per_cell))) for y in row]
-    force = sum(dw @ (nodes == 0) for nodes, _, dw in found)
-    assert abs(force) <= 1e-12 * per_cell
+    """Slopes of touching particles telescope, wherever they lie and however many fill a cell."""
+    row = x + np.arange(-30, 31) / per_cell
+    assert force_on_node(row, gimp_stencil(per_cell)) <= 1e-12 * per_cell
+
+
+def test_linear_splines_have_a_force_there():
+    assert force_on_node(0.1 + np.arange(-30, 31) / 1.8, STENCILS[1]) == 1.0
 
 
 def test_the_second_moment_depends_on_the_place():
