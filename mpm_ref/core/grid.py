@@ -9,6 +9,7 @@ import numpy as np
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
 from .order import slab_width
+from .precision import converted
 from .spline import base_of
 from .state import NONE, Grid
 
@@ -41,7 +42,7 @@ def extent(x):
     not finite.
     """
     d = x.shape[1]
-    low, high = np.full((CHUNKS, d), np.inf), np.full((CHUNKS, d), -np.inf)
+    low, high = np.full((CHUNKS, d), np.inf, x.dtype), np.full((CHUNKS, d), -np.inf, x.dtype)
     bad = np.full((CHUNKS, 1), -1)
     _extents(x, low, high, bad)
     if bad.max() >= 0:
@@ -51,7 +52,9 @@ def extent(x):
 
 
 class Storage:
-    """Reusable storage of a `Grid` for spacing dx [m] and a stencil; see `cover`."""
+    """Reusable storage of a `Grid` for spacing dx [m] and a stencil; see `cover`. The grid has the
+    precision of the points that it covers.
+    """
 
     def __init__(self, dx, stencil, dim, flip=False):
         self.dx, self.stencil, self.dim = dx, stencil, dim
@@ -64,24 +67,26 @@ class Storage:
         Raises OutOfRange where a point is not finite or the box would need more than MAX_BYTES.
         """
         low, high = self._box(clouds)
+        real = low.dtype.type
         first = self._base(low)
         first[0] -= first[0] % (2 * slab_width(self.stencil))     # see `order`
         shape = tuple(int(k) for k in self._base(high) + len(self.stencil) - first)
         size = int(np.prod(np.array(shape, dtype=float)))
         needed = size * (1 + self.vectors * self.dim)
-        if len(self._buffer) < needed:
-            self._buffer = np.empty(int(1.3 * needed))
+        if len(self._buffer) < needed or self._buffer.dtype != real:
+            self._buffer = np.empty(int(1.3 * needed), real)
         self._buffer[:needed] = 0.0
         return self._carve(shape, size, first)
 
     def _base(self, x):
-        return np.array([base_of(x_a, self.dx, self.stencil) for x_a in x], dtype=np.int64)
+        dx = converted(self.dx, x.dtype.type)
+        return np.array([base_of(x_a, dx, self.stencil) for x_a in x], dtype=np.int64)
 
     def _box(self, clouds):
         boxes = [extent(x) for x in clouds]
         low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
         nodes = np.prod((high - low) / self.dx + len(self.stencil))
-        size = 8.0 * nodes * (1 + self.vectors * self.dim)
+        size = low.itemsize * nodes * (1 + self.vectors * self.dim)
         if size > MAX_BYTES or max(-low.min(), high.max()) / self.dx > 2.0**50:
             raise OutOfRange(
                 f"particles from {low} to {high} need a grid of {size:.1e} bytes at "
@@ -91,13 +96,15 @@ class Storage:
         return low, high
 
     def _carve(self, shape, size, first):
-        d, at = self.dim, size
+        d, at, real = self.dim, size, self._buffer.dtype.type
         fields = []
         for _ in range(self.vectors):
             fields.append(self._buffer[at : at + size * d].reshape((*shape, d)))
             at += size * d
-        v, f, v_old = fields if self.vectors == 3 else (fields[0], NONE, NONE)
-        return Grid(self._buffer[:size].reshape(shape), v, f, v_old, first, self.dx)
+        none = converted(NONE, real)
+        v, f, v_old = fields if self.vectors == 3 else (fields[0], none, none)
+        m = self._buffer[:size].reshape(shape)
+        return Grid(m, v, f, v_old, first, self.dx)
 
 
 @kernel
@@ -159,7 +166,9 @@ def update(grid, gravity, dt, eps=0.0, on_empty=False):
     empty nodes the velocity dt g, both as in the release of NCLAW. Where the grid carries forces
     apart (FLIP), v_old is kept too.
     """
-    nodes, gravity = flattened(grid), np.asarray(gravity, dtype=float)
+    real = grid.v.dtype.type
+    nodes, gravity = flattened(grid), np.asarray(gravity, dtype=real)
+    dt, eps = converted(dt, real), converted(eps, real)
     if grid.f.ndim > 1:
         _update_all_apart(nodes, gravity, dt)
     else:

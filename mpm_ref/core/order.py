@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .precision import converted, with_rounded_spacing
 from .spline import base_of
 from .stencil import locate
 from .tensor import vec
@@ -85,7 +86,8 @@ def slabs_of(x, grid, stencil):
     width = slab_width(stencil)
     axis = slab_axis(grid.m.shape, width)
     n_slabs = -(-grid.m.shape[axis] // width)
-    along, cut = x[:, axis], Cut(grid.origin[axis], grid.dx)
+    along = x[:, axis]
+    cut = Cut(grid.origin[axis], converted(grid.dx, x.dtype.type))
     count = np.zeros((CHUNKS, n_slabs), dtype=np.int64)
     _count_all(along, cut, stencil, count)
     ends = np.cumsum(count.T.ravel()).reshape(n_slabs, CHUNKS)     # by slab, then by chunk
@@ -95,9 +97,9 @@ def slabs_of(x, grid, stencil):
 
 
 @kernel
-def _cells(x, grid, stencil, cell, bounds):
+def _cells(x, grid, stencil, cell):
     d = grid.m.shape
-    for p in range(bounds[0], bounds[1]):
+    for p in range(len(x)):
         base, _ = locate(vec(x, p, d), grid, stencil)
         key = 0
         for a in range(len(base)):
@@ -105,14 +107,8 @@ def _cells(x, grid, stencil, cell, bounds):
         cell[p] = key
 
 
-@parallel
-def _cells_all(x, grid, stencil, cell):
-    for c in prange(CHUNKS):
-        _cells(x, grid, stencil, cell, chunk(c, len(x)))
-
-
 def by_cell(x, grid, stencil):
     """Stable permutation that sorts the particles at x (N, d) by cell, first axis slowest."""
-    cell = np.empty(len(x), dtype=np.int64)
-    _cells_all(x, grid, stencil, cell)
+    cell, grid = np.empty(len(x), dtype=np.int64), with_rounded_spacing(grid)
+    _cells(x, grid, stencil, cell)      # serial: the sort below takes far longer
     return np.argsort(cell, kind="stable")

@@ -171,6 +171,9 @@ def check_scheme(scheme):
     if scheme.gimp:
         raise ValueError(f"gimp = {scheme.gimp} with an implicit integrator: its matrices are "
                          "those of splines; expected gimp = 0, or integrator = \"explicit\"")
+    if scheme.precision != "double":
+        raise ValueError(f"precision = {scheme.precision!r} with an implicit integrator: expected "
+                         "'double', which its sums of energies need")
     if scheme.f_bar:
         raise ValueError("f_bar = true with an implicit integrator: its energy has no averaged "
                          "volumes; expected f_bar = false, or integrator = \"explicit\"")

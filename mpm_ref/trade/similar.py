@@ -34,6 +34,7 @@ class StoredSetting(msgspec.Struct, forbid_unknown_fields=True):
     transfer: Word | UnsetType = UNSET
     gimp: NotNegative | UnsetType = UNSET
     f_bar: bool | UnsetType = UNSET
+    precision: Word | UnsetType = UNSET
     eps: Factor | UnsetType = UNSET
     boundary: Word | UnsetType = UNSET
 

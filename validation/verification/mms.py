@@ -54,6 +54,7 @@ class MmsRun(NamedTuple):
     crossings: float = 0.0      # relaxation of the transfer, in times dx/SOUND
     rpic: float = 0.0           # damping of the strain rate in C
     gimp: float = 0.0           # particles per cell and axis of GIMP
+    precision: str = "double"
 
     @property
     def dt(self):
@@ -65,7 +66,7 @@ class MmsRun(NamedTuple):
         """Return the `explicit.Scheme` of the run."""
         relaxation = self.crossings / (self.cells * SOUND)
         return Scheme(self.degree, self.transfer, rpic=self.rpic, relaxation=relaxation,
-                      gimp=self.gimp)
+                      gimp=self.gimp, precision=self.precision)
 
     @property
     def steps(self):
