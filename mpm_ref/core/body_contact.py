@@ -137,7 +137,7 @@ def shares_near(nodes, bodies, grid, stencil):
 def bases_of(nodes, shape, stencil):
     """Return the mask over a grid's nodes of those from which a stencil reaches one of `nodes`."""
     mask, at = np.zeros(shape, dtype=np.bool_), np.stack(np.unravel_index(nodes, shape))
-    for offset in tuples(stencil, repeat=len(shape)):
+    for offset in tuples(range(len(stencil)), repeat=len(shape)):
         base = at - np.array(offset)[:, None]
         mask[tuple(base[:, (base >= 0).all(axis=0)])] = True
     return mask

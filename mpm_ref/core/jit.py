@@ -253,10 +253,10 @@ def parallel_if_many(function):
 def by_type(name, position=-1):
     """A function `name(*arguments)` that calls the method registered for one argument's type.
 
-    The type is that of ``arguments[position]``, a NamedTuple class; methods are added with
-    ``f.method(Class, kernel)``. Compiled callers resolve the method when they are compiled, so
-    that it is inlined; and they are still cached on disk, which they are not when handed a kernel
-    as an argument. Raises TypeError for a type without a method.
+    The type is that of ``arguments[position]``, a NamedTuple class, or `tuple` for any other tuple;
+    methods are added with ``f.method(Class, kernel)``. Compiled callers resolve the method when
+    they are compiled, so that it is inlined; and they are still cached on disk, which they are not
+    when handed a kernel as an argument. Raises TypeError for a type without a method.
     """
     methods = {}
 
@@ -264,7 +264,7 @@ def by_type(name, position=-1):
         return _find(methods, name, type(arguments[position]))(*arguments)
 
     def resolve(*types):
-        method = _find(methods, name, getattr(types[position], "instance_class", None))
+        method = _find(methods, name, _class_of(types[position]))
         return lambda *arguments: method(*arguments)
 
     def add(cls, method):
@@ -276,6 +276,12 @@ def by_type(name, position=-1):
     dispatch.methods = methods
     overload(dispatch, jit_options=_OPTIONS, strict=False)(resolve)
     return dispatch
+
+
+def _class_of(known):
+    """Return the Python class of a tuple of a compiled type; None for anything else."""
+    plain = tuple if isinstance(known, numba.types.BaseTuple) else None
+    return getattr(known, "instance_class", plain)
 
 
 def _find(methods, name, cls):
