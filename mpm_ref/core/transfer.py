@@ -235,7 +235,7 @@ def p2g(particles, grid, stencil, dt, slabs, mls):
     Slabs of one colour are far enough apart to share no node, so they run in parallel; within a
     slab particles come in a fixed order. Hence the same bits for any number of threads.
     """
-    grid = with_rounded_spacing(grid)
+    grid, stencil = with_rounded_spacing(grid), converted(stencil, grid.v.dtype.type)
     run = scatter_lines_mls_color if mls else scatter_lines_color
     if fits(grid, stencil, mls):
         run = scatter_mls3_color
@@ -247,7 +247,7 @@ def g2p(particles, grid, stencil, dt, flip, mls):
     """New velocity, position and velocity gradient of all particles; see `gather` and
     `gather_mls`.
     """
-    grid = with_rounded_spacing(grid)
+    grid, stencil = with_rounded_spacing(grid), converted(stencil, grid.v.dtype.type)
     if fits(grid, stencil, mls):
         gather_mls3_all(particles, grid, stencil, dt)
     elif mls:
