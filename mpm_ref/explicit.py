@@ -13,7 +13,7 @@ from math import exp, inf
 import numpy as np
 
 from .body import AFFINE, check_fit, permute
-from .core import deform
+from .core import corotated, deform
 from .core.f_bar import NODES, averaged
 from .core.gimp import gimp_stencil
 from .core.grid import Storage, update
@@ -261,16 +261,20 @@ def deform_body(body, dt):
     its material needs.
     """
     particles, law, flow, dt, like = deformation(body, dt)
-    if particles.F.ndim == 1:
-        deform.fluid(particles, law, dt, like)
-    elif isinstance(flow, NoFlow):
-        deform.elastic(particles, law, dt, like)
-    elif type(flow) in returned.methods:
-        deform.full(particles, law, flow, dt, like)
-    elif deform.is_radial(law, flow):
-        deform.radial(particles, law, flow, dt, like)
-    else:
-        deform.plastic(particles, law, flow, dt, like)
+    with_flow = () if isinstance(flow, NoFlow) else (flow,)
+    deform_driver(body)(particles, law, *with_flow, dt, like)
+
+
+def deform_driver(body):
+    """Return the loop over particles by which `deform_body` updates a body."""
+    q, law, flow = body.particles, body.law, body.flow
+    if q.F.ndim == 1:
+        return deform.fluid
+    if isinstance(flow, NoFlow):
+        return corotated.elastic if corotated.fits(law, q.x.shape[1]) else deform.elastic
+    if type(flow) in returned.methods:
+        return deform.full
+    return deform.radial if deform.is_radial(law, flow) else deform.plastic
 
 
 def deformation(body, dt):

@@ -3,11 +3,12 @@
     F_trial = (I + dt L) F,   F = project(F_trial),   tau = kirchhoff(F)
 
 as in NSF-alg-mpm step 3, LDM-sec2.2-Frate and NCLAW-alg1.
-Five passes, by what the law needs: J alone (no F is carried), F without a return map, F with
-one. Return maps act on the singular values: F_trial = U diag(s) V^T becomes U diag(s_new) V^T,
-and tau = U diag(kirchhoff_hat(s_new)) U^T. The fourth is for those that act on the whole of F.
-The fifth is for radial return maps on Hencky's law, which need no singular values while strains
-are moderate: eps = log(F_trial F_trial^T)/2 becomes eps_new, F = exp(eps_new - eps) F_trial.
+Five passes, by what the law needs: J alone (no F is carried), F without a return map (for some laws
+in blocks, see `corotated`), F with one. Return maps act on the singular values:
+F_trial = U diag(s) V^T becomes U diag(s_new) V^T, and tau = U diag(kirchhoff_hat(s_new)) U^T. The
+fourth is for those that act on the whole of F. The fifth is for radial return maps on Hencky's law,
+which need no singular values while strains are moderate: eps = log(F_trial F_trial^T)/2 becomes
+eps_new, F = exp(eps_new - eps) F_trial.
 """
 
 from math import sqrt
@@ -25,9 +26,9 @@ from .law import (
 )
 from .logarithm import LEAST_STRETCH, exponential, hencky_strain
 from .spectral import rotation, svd
+from .state import growth
 from .tensor import (
     det,
-    identity,
     inner,
     lin,
     mat,
@@ -41,12 +42,6 @@ from .tensor import (
     scale_columns,
     trace,
 )
-
-
-@kernel
-def growth(L, p, dt, like):
-    """I + dt L_p."""
-    return mlin(1.0, identity(like), dt, mat(L, p, like))
 
 
 @kernel

@@ -20,11 +20,11 @@ next an alternating field averages out at every u, so that no checkerboard of th
 
 import numpy as np
 
-from .deform import growth
 from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .order import slabs_of
 from .precision import converted, with_rounded_spacing
 from .spline import STENCILS
+from .state import growth
 from .stencil import column, locate, node, product
 from .tensor import det, identity, mlin, put_mat, vec
 

@@ -24,6 +24,7 @@ psi = by_type("psi")                      # (F, law) -> energy per rest volume [
 pk1 = by_type("pk1")                      # (F, law) -> P = dpsi/dF
 kirchhoff = by_type("kirchhoff")          # (F, law) -> tau = P F^T
 dpk1 = by_type("dpk1")                    # (F, dF, law) -> dP = (d2psi/dF2) : dF
+kirchhoff_of_stretch = by_type("kirchhoff_of_stretch")  # (F, V, law) -> tau of F = V R
 kirchhoff_hat = by_type("kirchhoff_hat")  # (s, law) -> principal Kirchhoff stresses
 psi_volume = by_type("psi_volume")        # (J, law) -> energy density of a law that needs J only
 pressure = by_type("pressure")            # (J, law) -> isotropic tau of a law that needs J only

@@ -40,6 +40,7 @@ from .tensor import (
 )
 
 UNDETERMINED = 2.3e-16      # (s_i + s_j)/s_0, at and below which R is not determined
+MOST_ITERATIONS, SMALL_STEP = 8, 1e-6   # for the sum of singular values; the last step over it
 FAR_FROM_SINGULAR = 6.0     # most (sum s)^3/prod (s_i + s_j) for the fast rotation; 27/8 at F = I
 
 
@@ -89,11 +90,30 @@ def stretch(F):
         return mmt(rotation(F), F)
     else:
         if is_moderate(F):
-            V, ok = _fast_stretch(F)
+            B = mmt(F, F)
+            t = sum_of_singular(trace(B), trace(cofactor(B)), det(F))
+            V, ok = _fast_stretch(F, t)
             if ok:
                 return V
-        U, s, _, _ = svd(F)
-        return mmt(scale_columns(U, s), U)
+        return _stretch_by_svd(F)
+
+
+@kernel
+def stretch_by_sum(F, t):
+    """`stretch` in 3D, of F with the `sum_of_singular` t; that is not read where F is close to
+    singular, inverted, huge or tiny.
+    """
+    if is_moderate(F):
+        V, ok = _fast_stretch(F, t)
+        if ok:
+            return V
+    return _stretch_by_svd(F)
+
+
+@kernel
+def _stretch_by_svd(F):
+    U, s, _, _ = svd(F)
+    return mmt(scale_columns(U, s), U)
 
 
 @kernel
@@ -232,7 +252,7 @@ def _fast_rotation(F):
     else:
         K = cofactor(F)
         n2, J = inner(F, F), dot(F[0], K[0])
-        t = _sum_of_singular(n2, inner(K, K), J)
+        t = sum_of_singular(n2, inner(K, K), J)
         z = 0.5 * t * (t * t - n2) - J
         if not (FAR_FROM_SINGULAR * z > t * t * t):
             return F, False
@@ -241,11 +261,10 @@ def _fast_rotation(F):
 
 
 @leaf
-def _fast_stretch(F):
+def _fast_stretch(F, t):
     """R F^T of `_fast_rotation`, from B = F F^T: V = ((tr B + t^2)/2 B + t J I - B B)/z."""
     B, J = mmt(F, F), det(F)
     n2 = trace(B)
-    t = _sum_of_singular(n2, trace(cofactor(B)), J)
     z = 0.5 * t * (t * t - n2) - J
     if not (FAR_FROM_SINGULAR * z > t * t * t):
         return F, False
@@ -254,21 +273,33 @@ def _fast_stretch(F):
 
 
 @leaf
-def _sum_of_singular(n2, k2, J):
+def sum_of_singular(n2, k2, J):
     """t = sum s_i of n2 = |F|^2, k2 = |cof F|^2, J = det F.
 
     It is the largest root of (t^2 - n2)^2 - 8 J t - 4 k2. All roots are real, so that Halley's
     method descends to it from sqrt(3 n2) >= t. Given up where the rotation will be.
     """
     t = sqrt(3.0 * n2)
-    for _ in range(8):
-        h = t * t - n2
-        z = 0.5 * t * h - J
+    for _ in range(MOST_ITERATIONS):
+        z = product_of_sums(t, n2, J)
         if not (FAR_FROM_SINGULAR * z > t * t * t):
             break
-        f = h * h - 8.0 * J * t - 4.0 * k2
-        step = 8.0 * z * f / (64.0 * z * z - f * (6.0 * t * t - 2.0 * n2))
+        step = halley_step(t, z, n2, k2, J)
         t -= step
-        if step <= 1e-6 * t:
+        if step <= SMALL_STEP * t:
             break
     return t
+
+
+@kernel
+def product_of_sums(t, n2, J):
+    """Return z = prod (s_i + s_j) of t = sum s_i."""
+    return 0.5 * t * (t * t - n2) - J
+
+
+@kernel
+def halley_step(t, z, n2, k2, J):
+    """Return the step by which Halley's method lowers t, z of `product_of_sums`."""
+    h = t * t - n2
+    f = h * h - 8.0 * J * t - 4.0 * k2
+    return 8.0 * z * f / (64.0 * z * z - f * (6.0 * t * t - 2.0 * n2))

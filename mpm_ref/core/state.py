@@ -55,6 +55,12 @@ NO_HISTORY = np.empty((0, 0))     # the same for y, which has one axis when it i
 
 
 @kernel
+def growth(L, p, dt, like):
+    """I + dt L_p."""
+    return mlin(1.0, identity(like), dt, mat(L, p, like))
+
+
+@kernel
 def affine(C, p, like):
     """C_p, or zero where no affine field is carried."""
     if C.ndim == 3:

@@ -65,7 +65,13 @@ def kirchhoff(F, law):
     """Return the Kirchhoff stress 2 mu (F - R) F^T + lam (J - 1) J I [Pa] (NSF-eq12, whose print
     lacks I).
     """
-    D = mlin(1.0, mmt(F, F), -1.0, stretch(F))
+    return kirchhoff_of_stretch(F, stretch(F), law)
+
+
+@kernel
+def kirchhoff_of_stretch(F, V, law):
+    """Return the Kirchhoff stress 2 mu (F F^T - V) + lam (J - 1) J I [Pa] of F = V R."""
+    D = mlin(1.0, mmt(F, F), -1.0, V)
     return mlin(2.0 * law.mu, D, 1.0, fluid.kirchhoff(F, law))
 
 

@@ -34,7 +34,8 @@ STAGES = {          # of a step: beginnings of the names of the kernels that it 
     "grid to particles": ("core.transfer_lines.gather", "core.transfer_mls3.gather"),
     "averaged volumes": ("core.f_bar._",),
     "J alone": ("core.deform.fluid",),
-    "F": ("core.deform.elastic", "core.deform.plastic", "core.deform.radial", "core.deform.full"),
+    "F": ("core.corotated.elastic", "core.deform.elastic", "core.deform.plastic",
+          "core.deform.radial", "core.deform.full"),
     "return map": ("core.deform.plastic", "core.deform.radial", "core.deform.full"),
     "RPIC damping": ("core.transfer._damp",),
 }

@@ -10,9 +10,9 @@ import json
 import sys
 from types import FunctionType, ModuleType
 
-from .. import explicit
 from ..core import deform, jit
 from ..core.logarithm import LEAST_STRETCH
+from ..explicit import deform_driver
 from ..scene import build
 from ..scene.toml import parse
 from ..scene.validate import validate_scene
@@ -21,8 +21,8 @@ from ..simulate import simulate
 PACKAGE = __package__.partition(".")[0]
 STEPS = {"explicit": 70, "implicit": 3}     # past the first sort, checks and stable steps
 SVD = "core.spectral.svd"
-FALLBACKS = ("core.spectral.rotation", "core.spectral.stretch",     # SVD where strains are large
-             "core.deform.deform_radial", "materials.hencky.kirchhoff")
+FALLBACKS = ("core.spectral.rotation", "core.spectral.stretch", "core.spectral.stretch_by_sum",
+             "core.deform.deform_radial", "materials.hencky.kirchhoff")     # SVD of large strains
 ALWAYS, RARELY, NEVER = "every step", "large strains alone", "never"
 
 
@@ -91,27 +91,12 @@ def name_of(function):
 
 def svd_of(body):
     """Return when the deformation stage of a body computes an SVD: ALWAYS, RARELY or NEVER."""
-    entry, classes = deform_kernel(body), (type(body.law), type(body.flow))
+    entry, classes = deform_driver(body), (type(body.law), type(body.flow))
     if entry is deform.radial and body.flow.s_min >= LEAST_STRETCH:
         return ALWAYS
     if SVD in reached(entry, classes, FALLBACKS):
         return ALWAYS
     return RARELY if SVD in reached(entry, classes, ()) else NEVER
-
-
-def deform_kernel(body):
-    """Return the kernel that `explicit.deform_body` calls for a body."""
-    calls = []
-    names = ("fluid", "elastic", "full", "radial", "plastic")
-    recorder = {name: lambda *_, name=name: calls.append(name) for name in names}
-    spy = ModuleType("deform")
-    vars(spy).update(recorder, is_radial=deform.is_radial)
-    explicit.deform, original = spy, explicit.deform
-    try:
-        explicit.deform_body(body, 0.0)
-    finally:
-        explicit.deform = original
-    return getattr(deform, calls[0])
 
 
 def reached(entry, classes, stops):

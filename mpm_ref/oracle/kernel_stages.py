@@ -6,8 +6,8 @@ from .. import explicit
 from ..body import keep_inside
 from ..core import boundary
 from ..core.contact import PRESCRIBED
-from ..core.deform import growth
 from ..core.jit import kernel
+from ..core.state import growth
 from ..core.stencil import column, columns, locate, product, weights_per_axis
 from ..core.tensor import mat, mm, put_mat, vec
 from ..energy import energy

@@ -21,7 +21,7 @@ FLOORS = (
      "core.solids"),
     ("core.stencil", "core.state", "core.lines"),
     ("core.order", "core.adjoint.shape_gradient"),
-    ("core.grid", "core.deform", "core.levelset",
+    ("core.grid", "core.deform", "core.corotated", "core.levelset",
      "core.transfer core.transfer_lines core.transfer_mls3 core.relaxation"),
     ("core.motion", "core.contact", "core.displacement", "core.f_bar",
      "core.adjoint.transfer core.adjoint.transfer_mls3",

@@ -33,7 +33,6 @@ SCHEMES = {
     "linear": Scheme(1, "flip", flip=0.95),
     "pic": Scheme(3, "pic"),
     "gimp": Scheme(2, "flip", flip=0.95, gimp=2.0),
-    "gimp": Scheme(2, "flip", flip=0.95, gimp=2.0),
     "f_bar": Scheme(f_bar=True),
 }
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..deform import growth, recall, remember
+from ..deform import recall, remember
 from ..jit import CHUNKS, chunk, kernel, parallel, prange
 from ..law import (
     d_pressure,
@@ -34,6 +34,7 @@ from ..law import (
     units,
 )
 from ..spectral import UNDETERMINED, mixed, svd
+from ..state import growth
 from ..tensor import cofactor, det, diagonal, dot, mat, mlin, mm, mmt, put_mat, transpose
 
 
