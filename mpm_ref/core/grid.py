@@ -1,4 +1,4 @@
-"""Dense grid storage that covers the matter and moves with it, and the momentum update of its nodes.
+"""Dense grid storage that covers the matter and moves with it, and the momentum update of nodes.
 
 The grid is the smallest box of nodes that the particles reach, aligned to whole slabs along the
 first axis; `sparse_grid` has that of bodies far from each other. A domain box is a boundary
@@ -82,11 +82,12 @@ class Storage:
         for its size.
         """
         extents = [extent(x) for x in clouds]
-        low, high = np.min([e[0] for e in extents], axis=0), np.max([e[1] for e in extents], axis=0)
+        low = np.min([e[0] for e in extents], axis=0)
+        high = np.max([e[1] for e in extents], axis=0)
         if max(-low.min(), high.max()) / self.dx > FARTHEST:
             raise OutOfRange(
-                f"particles from {low} to {high}: expected coordinates of at most {FARTHEST:.0e} dx "
-                f"at dx = {self.dx}, beyond which the place in a cell is lost to round-off; has a "
+                f"particles from {low} to {high}: expected coordinates of at most {FARTHEST:.0e} "
+                f"times dx = {self.dx}, beyond which places in a cell are lost to round-off; has a "
                 "particle flown off?"
             )
         first = self._base(low)

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from clouds import DX
 from far_bodies import clusters, sparse_over
 from hypothesis import given
 from hypothesis import strategies as st
-from problems import DT
+from problems import DT, DX
 
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed
 from mpm_ref.core.levelset import half_space, sphere
@@ -23,7 +22,7 @@ def filled(seed, d, gap=0):
     returned too: (K, d) from the world's origin, and as indices in the arrays of both.
     """
     rng = np.random.default_rng(seed)
-    x = clusters(rng, d, centers=8, width=60.0)
+    x = clusters(rng, d, centers=8, width=50.0)
     grids = sparse_over(x, 2, gap=gap)
     reached = pairs(x, DX, 2).node
     node, one = np.unique(reached.reshape(-1, d), axis=0, return_index=True)
@@ -58,8 +57,7 @@ def test_nodes_beyond_a_plane_are_those_of_the_dense_grid_in_its_order(seed, d, 
 def parts(d):
     """Colliders that touch many nodes, with friction and motion, and a region."""
     up = np.eye(d)[-1]
-    turning = Motion(Steady(0.3 * up), rotation=Steady(2.0 if d == 2 else (0.0, 2.0, 1.0)),
-                     center=np.zeros(d))
+    turning = Motion(Steady(0.3 * up), Steady(2.0), None if d == 2 else up, np.zeros(d))
     floor = Collider(half_space(np.full(d, 0.37 * DX), 0.3 + up), "separate", 0.4)
     ball = Collider(sphere(np.full(d, 2.1 * DX), 14.3 * DX), "slip", 0.2, turning)
     region = Prescribed(sphere(np.full(d, -9.0 * DX), 6.0 * DX), Motion(Steady(up)))

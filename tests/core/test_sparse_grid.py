@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from clouds import COVER, DX, cloud, deep
+from clouds import COVER, cloud, deep
 from far_bodies import clusters, dense, rule, sparse, sparse_over
 from hypothesis import given
 from hypothesis import strategies as st
+from problems import DX
 from threads import by_threads
 
 from mpm_ref.core import grid as grids
@@ -120,7 +121,7 @@ def test_same_bits_for_any_number_of_threads(d, rng):
     def run():
         grid, _ = sparse_over(q.x, case.degree, case.separate)
         p2g(q, grid, case.stencil, 0.01, slabs_of(q.x, grid, case.stencil), True)
-        return grid.m.tobytes() + grid.v.tobytes() + grid.origin.tobytes()
+        return grid.m.tobytes() + grid.v.tobytes() + grid.place.tobytes()
 
     one, two = by_threads(run)
     assert one == two

@@ -14,6 +14,7 @@ from mpm_ref.explicit import Scheme
 from mpm_ref.materials import Fluid, NoFlow, make_flow
 from mpm_ref.problem import Clock, Problem
 
+WIDTH = {2: 200.0, 3: 50.0}     # [cells] of a cloud of clusters, such that dense grids are small
 FAST = 4.0          # [m/s] 0.08 cells a step: two such bodies meet after 125 steps and 20 cells
 
 
@@ -50,8 +51,9 @@ def sparse_over(x, degree=2, flip=False, gap=0):
     return first, second
 
 
-def clusters(rng, d, centers=6, n=40, width=200.0):
+def clusters(rng, d, centers=6, n=40, width=None):
     """Points x (N, d) [m] in clusters of 3 cells, the last of which is far from all others."""
+    width = WIDTH[d] if width is None else width
     c = rng.uniform(-0.5, 0.5, (centers, 1, d)) * width
     c[-1] = width
     return DX * (c + rng.uniform(-1.5, 1.5, (centers, n, d))).reshape(-1, d)
