@@ -53,7 +53,8 @@ class SparseStorage(Storage):
         first, size = self.boxes(islands, dense, axis)
         place = pack(self.room(size, axis), axis)
         shape = tuple(map(int, (place + size).max(axis=0)))
-        if prod(shape) > SHARE * prod(dense.shape):
+        nodes = prod(dense.shape)
+        if prod(shape) >= SHARE * nodes and self.bytes(nodes) <= MAX_BYTES:
             return self.zeroed(dense)
         origin = empty_table(len(islands.blocks), 2 * self.dim)
         fill(origin, islands.blocks, (place - first)[islands.number], tuple(range(self.dim)))
