@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.body import Body, particles_at, with_separate_gradient
+from mpm_ref.body import Body, in_precision, particles_at, with_separate_gradient
 from mpm_ref.core.boundary import Collider, Conditions, nclaw_walls
 from mpm_ref.core.jit import set_threads
 from mpm_ref.core.levelset import half_space
@@ -49,6 +49,9 @@ VARIANTS = (
     Variant("MLS that relaxes", Scheme(relaxation=1e-3)),
     Variant("APIC that relaxes", Scheme(transfer="apic", relaxation=1e-3)),
     Variant("averaged volumes (F-bar)", Scheme(f_bar=True)),
+    Variant("MLS in single precision", Scheme(precision="single")),
+    Variant("APIC in single precision", Scheme(transfer="apic", precision="single")),
+    Variant("Hencky with Drucker-Prager in single precision", Scheme(precision="single"), SAND),
     Variant("walls of a box", conditions="walls"),
     Variant("floor with friction", conditions="floor"),
     Variant("floor with friction, at its surface", conditions="surface"),
@@ -98,6 +101,7 @@ def make_body(variant, block):
         particles = with_separate_gradient(particles)
     if material.has_history:
         particles = particles._replace(y=np.full(count, material.initial_y))
+    particles = in_precision(particles, variant.scheme.real)
     return Body("block", particles, law, material.flow, np.arange(count))
 
 

@@ -46,6 +46,9 @@ class StepAdjoint:
             raise ValueError(AT_NODES)
         if stepper.contacts:
             raise ValueError("contact of bodies has no adjoint: expected a Stepper without")
+        if stepper.scheme.precision != "double":
+            raise ValueError(f"precision = {stepper.scheme.precision!r}: the adjoint computes in "
+                             "double alone; expected a scheme with precision = 'double'")
         if stepper.scheme.f_bar:
             raise ValueError("f_bar = True: averaged volumes have no adjoint; expected a scheme "
                              "with f_bar = False")

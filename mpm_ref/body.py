@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .core.law import kirchhoff_hat, returned
+from .core.precision import converted
 from .core.state import NO_HISTORY, NONE, Particles
 from .materials import Fluid, Hardening, NoFlow, Softening
 
@@ -43,6 +44,13 @@ def particles_at(x, v, m, V0, transfer="mls", fluid=False):
         y=NO_HISTORY,
         b=NONE,
     )
+
+
+def in_precision(particles, real):
+    """Return particles with arrays of the float type `real`; L stays the array of C where it is."""
+    shared = particles.L is particles.C
+    particles = converted(particles, real)
+    return particles._replace(L=particles.C) if shared else particles
 
 
 def with_separate_gradient(particles):
@@ -109,6 +117,10 @@ def _wrong_arrays(body, d):
 
 def _wrong_fields(body, scheme):
     q, n, transfer = body.particles, len(body.particles.x), scheme.transfer
+    others = {name: a.dtype for name, a in q._asdict().items() if a.dtype != scheme.real}
+    for name, kind in others.items():
+        yield (f"{name} is of type {kind}, expected {np.dtype(scheme.real)} with precision = "
+               f"{scheme.precision!r}; see in_precision")
     if (q.C.ndim == 3) != (transfer in AFFINE):
         has, needs = ("a", "none") if q.C.ndim == 3 else ("no", "one")
         yield f"it carries {has} C, the transfer {transfer!r} needs {needs}; see particles_at"

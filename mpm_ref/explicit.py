@@ -18,6 +18,7 @@ from .core.f_bar import NODES, averaged
 from .core.grid import Storage, update
 from .core.law import returned
 from .core.order import by_cell, slabs_of
+from .core.precision import PRECISIONS, converted
 from .core.sparse_grid import SparseStorage
 from .core.spline import STENCILS
 from .core.transfer import g2p, p2g, rpic
@@ -34,8 +35,9 @@ class Scheme:
     of FLIP (1) against PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); relaxation
     [s] is the time in which v and C of the particles relax to those of the grid, 0 for at once;
     mass_eps [kg] and gravity_on_empty are NCLAW's, the latter without effect on particles; f_bar
-    averages the growth of volume over cells, against locking (see `core.f_bar`). Raises ValueError
-    for a combination that does not exist.
+    averages the growth of volume over cells, against locking (see `core.f_bar`); precision "single"
+    stores and computes in floats of 4 bytes. Raises ValueError for a combination that does not
+    exist.
     """
 
     degree: int = 2
@@ -46,8 +48,12 @@ class Scheme:
     mass_eps: float = 0.0
     gravity_on_empty: bool = False
     f_bar: bool = False
+    precision: str = "double"
 
     def __post_init__(self):
+        if self.precision not in PRECISIONS:
+            raise ValueError(f"precision = {self.precision!r}: expected one of "
+                             f"{', '.join(PRECISIONS)}")
         if self.transfer not in TRANSFERS:
             known = ", ".join(TRANSFERS)
             raise ValueError(f"transfer = {self.transfer!r}: expected one of {known}")
@@ -84,6 +90,11 @@ class Scheme:
                 raise ValueError(f"relaxation = {self.relaxation} with {name} = "
                                  f"{getattr(self, name)}: these two have no common step; leave one "
                                  "of them out")
+
+    @property
+    def real(self):
+        """Return the type of the floats of particles and nodes."""
+        return PRECISIONS[self.precision]
 
     @property
     def affine(self):
@@ -211,6 +222,7 @@ def scatter(bodies, store, scheme, dt):
     on a grid that covers them.
     """
     grid = store.cover([body.particles.x for body in bodies])
+    dt = converted(dt, grid.v.dtype.type)
     for body in bodies:
         slabs = slabs_of(body.particles.x, grid, scheme.stencil)
         p2g(body.particles, grid, scheme.stencil, dt, slabs, scheme.transfer == "mls")
@@ -219,8 +231,8 @@ def scatter(bodies, store, scheme, dt):
 
 def gather(body, grid, scheme, dt):
     """Update velocity, position and velocity gradient of a body's particles from the grid."""
-    share, mls = scheme.share(dt), scheme.transfer == "mls"
-    g2p(body.particles, grid, scheme.stencil, dt, share, mls)
+    dt, share = converted((dt, scheme.share(dt)), grid.v.dtype.type)
+    g2p(body.particles, grid, scheme.stencil, dt, share, scheme.transfer == "mls")
 
 
 def damp(body, scheme):
@@ -235,8 +247,7 @@ def deform_body(body, dt):
     """Update deformation gradient and stress, with the return map, of a body's particles; only what
     its material needs.
     """
-    particles, law, flow = body.particles, body.law, body.flow
-    like = tuple(range(particles.x.shape[1]))
+    particles, law, flow, dt, like = deformation(body, dt)
     if particles.F.ndim == 1:
         deform.fluid(particles, law, dt, like)
     elif isinstance(flow, NoFlow):
@@ -249,10 +260,20 @@ def deform_body(body, dt):
         deform.plastic(particles, law, flow, dt, like)
 
 
+def deformation(body, dt):
+    """Return particles, law, flow, dt and a tuple as long as a position, all in the precision of
+    the particles.
+    """
+    particles, real = body.particles, body.particles.F.dtype.type
+    like = tuple(range(particles.x.shape[1]))
+    like = like if real is np.float64 else tuple(map(real, like))
+    return particles, *converted((body.law, body.flow, dt), real), like
+
+
 def initial_stress(body):
     """Compute the Kirchhoff stress of a body's current state."""
-    like = tuple(range(body.particles.x.shape[1]))
-    if body.particles.F.ndim == 1:
-        deform.initial_pressure(body.particles, body.law)
+    particles, law, flow, _, like = deformation(body, 0.0)
+    if particles.F.ndim == 1:
+        deform.initial_pressure(particles, law)
     else:
-        deform.initial_stress(body.particles, body.law, body.flow, like)
+        deform.initial_stress(particles, law, flow, like)

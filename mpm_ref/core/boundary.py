@@ -235,7 +235,7 @@ def nodes_within(nodes, shape, inside, poses, margin):
         near = near[in_order_of_space(nodes.origin[near])]
     n, v = side * normals(X[near], shape), np.empty((len(near), d))
     nodes = selected(nodes, near)
-    _carry_all(nodes, region, pose, n, v)
+    carry(nodes, region, pose, n, v, (0, len(n)))
     return Touch(nodes.flat, n, v), away[near] / nodes.dx
 
 
@@ -262,7 +262,7 @@ def solve(touches, kind, mu, grid):
     contacts, start = by_node(touches, kind, mu)
     if len(contacts.node):
         _settle_all(contacts, start, grid.v.reshape(-1, d), grid.m.shape)
-        _add_all_impulses(contacts, grid.m.reshape(-1), J)
+        add_impulses_by_chunk(contacts, grid.m.reshape(-1), J)
     return J.sum(axis=0)
 
 
@@ -327,18 +327,15 @@ def _pull_back_all(nodes, region, X):
 
 
 @parallel
-def _carry_all(nodes, region, pose, n, v):
-    for c in prange(CHUNKS):
-        carry(nodes, region, pose, n, v, chunk(c, len(n)))
-
-
-@parallel
 def _settle_all(contacts, start, v, like):
     for c in prange(CHUNKS):
         settle(contacts, start, v, like, chunk(c, len(start) - 1))
 
 
-@parallel
-def _add_all_impulses(contacts, m, J):
-    for c in prange(CHUNKS):
+# Few nodes are in contact, and each parallel driver takes half a second to compile.
+
+@kernel
+def add_impulses_by_chunk(contacts, m, J):
+    """`add_impulses` of all pairs, with the sums J (CHUNKS, P, d) of the chunks kept separate."""
+    for c in range(CHUNKS):
         add_impulses(contacts, m, J[c], chunk(c, len(contacts.node)))

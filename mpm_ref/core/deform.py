@@ -34,6 +34,7 @@ from .tensor import (
     mlin,
     mm,
     mmt,
+    number,
     plus_diagonal,
     put_mat,
     scale,
@@ -110,9 +111,10 @@ def principal_return(F, y, dt, law, flow):
 def radial_return(F, eps, y, law, flow):
     """F, tau and y after a radial return map of the strain eps of F."""
     tr = trace(eps)
-    eps_hat = plus_diagonal(eps, -tr * (1.0 / len(F)))
+    d = number(len(F), tr)
+    eps_hat = plus_diagonal(eps, -tr * (1.0 / d))
     size = sqrt(inner(eps_hat, eps_hat))
-    dgamma, y, released = plastic_strain(len(F), tr, size, y, law, flow)
+    dgamma, y, released = plastic_strain(d, tr, size, y, law, flow)
     if released:
         return rotation(F), scale(0.0, eps), y
     if dgamma > 0.0:

@@ -23,6 +23,7 @@ import numpy as np
 from .deform import growth
 from .jit import CHUNKS, chunk, kernel, parallel, prange
 from .order import slabs_of
+from .precision import converted, with_rounded_spacing
 from .spline import STENCILS
 from .stencil import column, locate, node, product
 from .tensor import det, identity, mlin, put_mat, vec
@@ -109,7 +110,9 @@ def averaged(particles, cells, dt):
     cells is a zeroed `Grid` over the `NODES` of the particles; its m becomes the volume at rest in
     each cell [m^d]. The same bits for any number of threads, as in `transfer.p2g`.
     """
-    slabs, grown = slabs_of(particles.x, cells, NODES), np.zeros(cells.m.shape)
+    real = cells.m.dtype.type
+    slabs, grown = slabs_of(particles.x, cells, NODES), np.zeros(cells.m.shape, real)
+    cells, dt = with_rounded_spacing(cells), converted(dt, real)
     for color in (0, 1):
         _scatter_color(particles, cells, grown, dt, slabs, color)
     Lbar = np.empty_like(particles.L)

@@ -12,6 +12,7 @@ import numpy as np
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
 from .order import slab_width
+from .precision import converted
 from .spline import base_of
 from .state import NONE, Grid
 
@@ -45,7 +46,7 @@ def extent(x):
     not finite.
     """
     d = x.shape[1]
-    low, high = np.full((CHUNKS, d), np.inf), np.full((CHUNKS, d), -np.inf)
+    low, high = np.full((CHUNKS, d), np.inf, x.dtype), np.full((CHUNKS, d), -np.inf, x.dtype)
     bad = np.full((CHUNKS, 1), -1)
     _extents(x, low, high, bad)
     if bad.max() >= 0:
@@ -59,10 +60,13 @@ class NodeBox(NamedTuple):
 
     first: np.ndarray       # (d,)  index of its first node, from the world's origin
     shape: tuple            # nodes along each axis
+    real: type              # of the floats of its grid
 
 
 class Storage:
-    """Reusable storage of a `Grid` for spacing dx [m] and a stencil; see `cover`."""
+    """Reusable storage of a `Grid` for spacing dx [m] and a stencil; see `cover`. The grid has the
+    precision of the points that it covers.
+    """
 
     def __init__(self, dx, stencil, dim, flip=False):
         self.dx, self.stencil, self.dim = dx, stencil, dim
@@ -92,11 +96,12 @@ class Storage:
             )
         first = self._base(low)
         first[0] -= first[0] % (2 * slab_width(self.stencil))     # see `order`
-        return NodeBox(first, tuple(map(int, self._base(high) + len(self.stencil) - first)))
+        shape = tuple(map(int, self._base(high) + len(self.stencil) - first))
+        return NodeBox(first, shape, low.dtype.type)
 
-    def bytes(self, nodes):
-        """Return the memory [bytes] that a number of nodes takes."""
-        return 8 * nodes * (1 + self.vectors * self.dim)
+    def bytes(self, shape, box):
+        """Return the memory [bytes] of arrays of a shape, for the matter in a `NodeBox`."""
+        return np.dtype(box.real).itemsize * prod(shape) * (1 + self.vectors * self.dim)
 
     def zeroed(self, box):
         """Return the zeroed dense grid of a `NodeBox`. Raises OutOfRange as `fields`."""
@@ -107,29 +112,30 @@ class Storage:
         OutOfRange where they would need more than MAX_BYTES.
         """
         size = prod(shape)
-        if self.bytes(size) > MAX_BYTES:
+        if self.bytes(shape, box) > MAX_BYTES:
             low, high = box.first * self.dx, (box.first + box.shape - 1) * self.dx
             raise OutOfRange(
-                f"nodes from {low} to {high} need a grid of {self.bytes(size):.1e} bytes at "
+                f"nodes from {low} to {high} need a grid of {self.bytes(shape, box):.1e} bytes at "
                 f"dx = {self.dx}, at most {MAX_BYTES:.0e} are allowed; has a particle flown off, "
                 "or is dx too small?"
             )
         needed = size * (1 + self.vectors * self.dim)
-        if len(self._buffer) < needed:
-            self._buffer = np.empty(int(1.3 * needed))
+        if len(self._buffer) < needed or self._buffer.dtype != box.real:
+            self._buffer = np.empty(int(1.3 * needed), box.real)
         self._buffer[:needed] = 0.0
         return self._carve(shape, size)
 
     def _base(self, x):
-        return np.array([base_of(x_a, self.dx, self.stencil) for x_a in x], dtype=np.int64)
+        dx = converted(self.dx, x.dtype.type)
+        return np.array([base_of(x_a, dx, self.stencil) for x_a in x], dtype=np.int64)
 
     def _carve(self, shape, size):
-        d, at = self.dim, size
+        d, at, none = self.dim, size, converted(NONE, self._buffer.dtype.type)
         vectors = []
         for _ in range(self.vectors):
             vectors.append(self._buffer[at : at + size * d].reshape((*shape, d)))
             at += size * d
-        v, f, v_old = vectors if self.vectors == 3 else (vectors[0], NONE, NONE)
+        v, f, v_old = vectors if self.vectors == 3 else (vectors[0], none, none)
         return self._buffer[:size].reshape(shape), v, f, v_old
 
 
@@ -192,7 +198,9 @@ def update(grid, gravity, dt, eps=0.0, on_empty=False):
     empty nodes the velocity dt g, both as in the release of NCLAW. Where the grid carries forces
     apart (FLIP), v_old is kept too.
     """
-    nodes, gravity = flattened(grid), np.asarray(gravity, dtype=float)
+    real = grid.v.dtype.type
+    nodes, gravity = flattened(grid), np.asarray(gravity, dtype=real)
+    dt, eps = converted(dt, real), converted(eps, real)
     if grid.f.ndim > 1:
         _update_all_apart(nodes, gravity, dt)
     else:

@@ -174,7 +174,8 @@ def number_islands(blocks, parent, number, boxes, like):
 
 
 def islands_of(clouds, dx, stencil):
-    """Return the `Islands` of the points of `clouds`, arrays (N, d) of finite numbers [m].
+    """Return the `Islands` of the points of `clouds`, arrays (N, d) of finite numbers [m]; dx has
+    their precision.
 
     Points of all clouds are grouped together; their order changes the order of the islands alone.
     """

@@ -16,6 +16,7 @@ Every option and its reason:
   default changes when another package installs TBB. The bits of our results do not depend on it.
 * Waiting OpenMP threads sleep instead of spinning: on a machine that does other work too, spinning
   made steps of small scenes 8 times slower. Set OMP_WAIT_POLICY=ACTIVE where the cores are yours.
+* ``pipeline_class``: kernels of single arguments compute in single precision (`precision`).
 * ``no_cfunc_wrapper``: no kernel is handed to C, and the wrapper for that takes time to compile.
 * Parallel loops run over a fixed number of chunks, never over "one chunk per thread": a result is a
   function of the input alone. See `chunk` and `total`.
@@ -36,14 +37,17 @@ from types import FunctionType
 import numba
 import numpy as np
 import platformdirs
-from numba import njit, prange
+from numba import njit
 from numba.extending import overload, typeof_impl
 
+from . import precision
 from .kernel_cache import WRITING, KernelCache, compilations, mark_altered, report
 
 CHUNKS = 64          # of every parallel loop and reduction
 VERSIONS = 4         # of the package whose compiled kernels stay on disk, however old
 IN_USE = 86400.0     # [s] since a version was opened, in which it may still be in use: stays too
+
+prange = numba.prange       # of the drivers
 
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef)
 _OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True}
@@ -143,7 +147,7 @@ CACHE_DIR = _cache_dir()
 
 def _compiled(function, **options):
     """Return Numba's dispatcher of a function, with our cache."""
-    dispatcher = njit(**_OPTIONS, **options)(function)
+    dispatcher = njit(pipeline_class=precision.Compiler, **_OPTIONS, **options)(function)
     dispatcher._cache = KernelCache(function, CACHE_DIR)
     return dispatcher
 
@@ -251,18 +255,18 @@ def _sum(a, start, stop):
     return s
 
 
-@parallel
-def _partial_sums(a, parts):
-    for c in prange(CHUNKS):
+@kernel
+def _sum_of_chunks(a):
+    s = 0.0
+    for c in range(CHUNKS):
         start, stop = chunk(c, len(a))
-        parts[c] = _sum(a, start, stop)
+        s += _sum(a, start, stop)
+    return s
 
 
 def total(a):
-    """Sum of a 1-D array, in the same order of additions for any number of threads."""
-    parts = np.empty(CHUNKS)
-    _partial_sums(a, parts)
-    return _sum(parts, 0, CHUNKS)
+    """Sum of a 1-D array, in double: of chunks, whose sums are added in turn."""
+    return _sum_of_chunks(np.asarray(a, dtype=float))
 
 
 def set_threads(n):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import kernel
 from .sparse_grid import is_sparse
 from .tensor import vec
 
@@ -137,20 +137,10 @@ def lines_of(size, k, like):
 
 
 @kernel
-def count_mass(grid, k):
-    """Number of nodes with mass in box k."""
-    shape, m, n = grid.m.shape, grid.m.reshape(-1), 0
-    for line in range(lines_of(grid.size, k, shape)):
-        i = flat_number(line_offset(line, grid.size, k, shape), grid.place, k, shape)
-        for l in range(grid.size[k, len(shape) - 1]):
-            if m[i + l] > 0.0:
-                n += 1
-    return n
-
-
-@kernel
 def list_mass(grid, k, row, flat, index):
-    """Put the nodes with mass in box k into flat (A,) and index (A, d) from a row on."""
+    """Put the nodes with mass in box k into flat (A,) and index (A, d) from a row on; returns the
+    row after them.
+    """
     shape, m = grid.m.shape, grid.m.reshape(-1)
     last = len(shape) - 1
     for line in range(lines_of(grid.size, k, shape)):
@@ -163,22 +153,16 @@ def list_mass(grid, k, row, flat, index):
                     index[row, a] = grid.first[k, a] + offset[a]
                 index[row, last] += l
                 row += 1
+    return row
 
 
-@parallel
-def _count_all_mass(grid, boxes, count):
-    for c in prange(CHUNKS):
-        start, stop = chunk(c, len(boxes))
-        for b in range(start, stop):
-            count[b] = count_mass(grid, boxes[b])
-
-
-@parallel
-def _list_all_mass(grid, boxes, first, flat, index):
-    for c in prange(CHUNKS):
-        start, stop = chunk(c, len(boxes))
-        for b in range(start, stop):
-            list_mass(grid, boxes[b], first[b], flat, index)
+@kernel
+def list_all_mass(grid, boxes, flat, index):
+    """`list_mass` of boxes one after another; returns the number of nodes."""
+    row = 0
+    for k in boxes:
+        row = list_mass(grid, k, row, flat, index)
+    return row
 
 
 def sparse_nodes(grid, boxes=None):
@@ -186,10 +170,7 @@ def sparse_nodes(grid, boxes=None):
     their indices (A, d) from the world's origin; of all boxes, or of those with given numbers.
     """
     boxes = np.arange(len(grid.first)) if boxes is None else boxes
-    count = np.zeros(len(boxes), dtype=np.int64)
-    _count_all_mass(grid, boxes, count)
-    ends = np.cumsum(count)
-    total = int(ends[-1]) if len(ends) else 0
-    flat, index = np.empty(total, np.int64), np.empty((total, grid.m.ndim), np.int64)
-    _list_all_mass(grid, boxes, ends - count, flat, index)
-    return flat, index
+    most = int(grid.size[boxes].prod(axis=1).sum())
+    flat, index = np.empty(most, np.int64), np.empty((most, grid.m.ndim), np.int64)
+    n = list_all_mass(grid, boxes, flat, index)
+    return flat[:n], index[:n]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .precision import converted, with_rounded_spacing
 from .spline import base_of
 from .stencil import locate
 from .tensor import vec
@@ -92,9 +93,9 @@ def slabs_of(x, grid, stencil):
     width = slab_width(stencil)
     if grid.origin.ndim == 1:
         axis = slab_axis(grid.m.shape, width)
-        along, cut = x[:, axis], Cut(grid.origin[axis], grid.dx)
+        along, cut = x[:, axis], Cut(grid.origin[axis], converted(grid.dx, x.dtype.type))
     else:
-        axis, along, cut = grid.axis, x, grid
+        axis, along, cut = grid.axis, x, with_rounded_spacing(grid)
     n_slabs = -(-grid.m.shape[axis] // width)
     count = np.zeros((CHUNKS, n_slabs), dtype=np.int64)
     _count_all(along, cut, stencil, count)
@@ -105,20 +106,14 @@ def slabs_of(x, grid, stencil):
 
 
 @kernel
-def _cells(x, grid, stencil, cell, bounds):
+def _cells(x, grid, stencil, cell):
     d = grid.m.shape
-    for p in range(bounds[0], bounds[1]):
+    for p in range(len(x)):
         base, _ = locate(vec(x, p, d), grid, stencil)
         key = 0
         for a in range(len(base)):
             key = key * d[a] + base[a]
         cell[p] = key
-
-
-@parallel
-def _cells_all(x, grid, stencil, cell):
-    for c in prange(CHUNKS):
-        _cells(x, grid, stencil, cell, chunk(c, len(x)))
 
 
 def base_coordinates(x, dx, stencil):
@@ -128,8 +123,9 @@ def base_coordinates(x, dx, stencil):
 
 def by_cell(x, grid, stencil):
     """Stable permutation that sorts the particles at x (N, d) by cell, first axis slowest."""
+    grid = with_rounded_spacing(grid)
     if grid.origin.ndim > 1:
         return np.lexsort(base_coordinates(x, grid.dx, stencil).T[::-1])
     cell = np.empty(len(x), dtype=np.int64)
-    _cells_all(x, grid, stencil, cell)
+    _cells(x, grid, stencil, cell)      # serial: the sort below takes far longer
     return np.argsort(cell, kind="stable")

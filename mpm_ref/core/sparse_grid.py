@@ -19,6 +19,7 @@ from .islands import islands_of
 from .jit import kernel
 from .order import slab_axis, slab_width
 from .packing import pack
+from .precision import converted
 from .state import Grid, SparseGrid
 from .tensor import put_vec, vec
 
@@ -48,22 +49,23 @@ class SparseStorage(Storage):
         dense = self.box(clouds)
         if not self.is_wide(dense, sum(map(len, clouds))):
             return self.zeroed(dense)
-        islands = islands_of(clouds, self.dx, self.stencil)
+        islands = islands_of(clouds, converted(self.dx, dense.real), self.stencil)
         axis = slab_axis(dense.shape, slab_width(self.stencil))
         first, size = self.boxes(islands, dense, axis)
         place = pack(self.room(size, axis), axis)
         shape = tuple(map(int, (place + size).max(axis=0)))
-        nodes = prod(dense.shape)
-        if prod(shape) >= SHARE * nodes and self.bytes(nodes) <= MAX_BYTES:
+        if prod(shape) >= SHARE * prod(dense.shape) and self.fits(dense):
             return self.zeroed(dense)
-        origin = empty_table(len(islands.blocks), 2 * self.dim)
-        fill(origin, islands.blocks, (place - first)[islands.number], tuple(range(self.dim)))
+        origin = table_of_shifts(islands.blocks, (place - first)[islands.number])
         return SparseGrid(*self.fields(shape, dense), origin, self.dx, first, place, size, axis)
 
-    def is_wide(self, box, particles):
+    def fits(self, dense):
+        """Return whether a dense grid needs at most MAX_BYTES."""
+        return self.bytes(dense.shape, dense) <= MAX_BYTES
+
+    def is_wide(self, dense, particles):
         """Return whether a dense grid has so many nodes that islands are looked for."""
-        nodes = prod(box.shape)
-        return nodes > max(LEAST, PER_PARTICLE * particles) or self.bytes(nodes) > MAX_BYTES
+        return prod(dense.shape) > max(LEAST, PER_PARTICLE * particles) or not self.fits(dense)
 
     def boxes(self, islands, dense, axis):
         """Return first node and size, (n, d), of the box of each island, aligned to whole slabs of
@@ -82,6 +84,15 @@ class SparseStorage(Storage):
         room, pair = size + self.gap, 2 * slab_width(self.stencil)
         room[:, axis] += -room[:, axis] % pair
         return room
+
+
+def table_of_shifts(blocks, shift):
+    """Return a table (see `block_table`) of blocks, by their boxes (B, 2 d), with their shifts
+    (B, d).
+    """
+    table = empty_table(len(blocks), blocks.shape[1])
+    fill(table, blocks, shift, tuple(range(shift.shape[1])))
+    return table
 
 
 @kernel

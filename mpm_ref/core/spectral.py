@@ -24,16 +24,19 @@ from .tensor import (
     det,
     diagonal,
     dot,
+    doubles,
     fill,
     inner,
     mlin,
     mm,
     mmt,
     mv,
+    numbers,
     plus_diagonal,
     scale_columns,
     trace,
     transpose,
+    vector_of,
 )
 
 UNDETERMINED = 2.3e-16      # (s_i + s_j)/s_0, at and below which R is not determined
@@ -44,13 +47,15 @@ FAR_FROM_SINGULAR = 6.0     # most (sum s)^3/prod (s_i + s_j) for the fast rotat
 def svd(F):
     """F = U diag(s) V^T, det U = det V = +1, s[0] >= s[1] >= |s[2]|; s[-1] has the sign of det F.
 
-    Returns U, s, V, ok. For input that is not finite ok is False and U, s, V are NaN.
+    Returns U, s, V, ok. For input that is not finite ok is False and U, s, V are NaN. Of a single F
+    they are computed in double, then rounded.
     """
     if not is_finite(F):
-        return not_a_number(F), fill(nan, F), not_a_number(F), False
-    A, e = moderate(F)
+        return not_a_number(F), fill(nan, F[0]), not_a_number(F), False
+    A, e = moderate(doubles(F))
     U, s, V = _svd(A)
-    return U, rescaled(s, e), V, True
+    one = F[0][0]
+    return numbers(U, one), vector_of(rescaled(s, e), one), numbers(V, one), True
 
 
 @kernel

@@ -9,6 +9,7 @@ last.
 from .block_table import block_of, row_of
 from .jit import kernel
 from .spline import base_of, slopes, weights
+from .tensor import number
 
 
 @kernel
@@ -19,10 +20,18 @@ def locate(x, grid, stencil):
     dx, o = grid.dx, grid.origin
     if len(x) == 2:
         i, j = base_of(x[0], dx, stencil), base_of(x[1], dx, stencil)
-        return in_arrays((i, j), o), (x[0] / dx - i, x[1] / dx - j)
+        s = offset(x[0] / dx, i), offset(x[1] / dx, j)
+        return in_arrays((i, j), o), s
     else:
         i, j, k = base_of(x[0], dx, stencil), base_of(x[1], dx, stencil), base_of(x[2], dx, stencil)
-        return in_arrays((i, j, k), o), (x[0] / dx - i, x[1] / dx - j, x[2] / dx - k)
+        s = offset(x[0] / dx, i), offset(x[1] / dx, j), offset(x[2] / dx, k)
+        return in_arrays((i, j, k), o), s
+
+
+@kernel
+def offset(xi, i):
+    """Return xi - i of a coordinate xi and the number i of a node [cells]."""
+    return xi - number(i, xi)
 
 
 @kernel
@@ -135,7 +144,7 @@ def inverse_inertia(dx, stencil):
     """D^-1 of sum_i w_ip r_ip r_ip^T = dx^2 (degree + 1)/12 I [1/m^2]; degrees 2 and 3 only
     (NSF-alg-mpm).
     """
-    return 12.0 / (len(stencil) * dx**2)
+    return 12.0 / (number(len(stencil), dx) * dx**2)
 
 
 @kernel

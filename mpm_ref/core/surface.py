@@ -149,7 +149,7 @@ def satisfy(points, rules, prescribed, grid):
     v = grid.v.reshape(-1, d)
     fixed = np.isin(every.node, prescribed)
     detach(every, (fixed & (every.a != 0.0)).any(axis=1))
-    m = np.maximum(grid.m.reshape(-1)[every.node], LIGHTEST)
+    m = np.maximum(grid.m.reshape(-1)[every.node], LIGHTEST, dtype=float)
     share = np.where((every.a != 0.0) & ~fixed, 1.0 / m, 0.0)
     kind, mu = (np.repeat(rule, sizes) for rule in rules)
     kind = by_approach(every, kind, v)

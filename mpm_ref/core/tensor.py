@@ -7,7 +7,39 @@ untaken branch costs nothing. Arguments named `like` only lend their length.
 
 from math import sqrt
 
+import numpy as np
+
 from .jit import kernel
+
+
+@kernel
+def number(i, like):
+    """The number i as a float of the precision of `like`."""
+    return type(like)(i)
+
+
+@kernel
+def vector_of(x, like):
+    """The vector x with floats of the precision of the number `like`."""
+    if len(x) == 2:
+        return number(x[0], like), number(x[1], like)
+    else:
+        return number(x[0], like), number(x[1], like), number(x[2], like)
+
+
+@kernel
+def numbers(A, like):
+    """The matrix A with floats of the precision of the number `like`."""
+    if len(A) == 2:
+        return vector_of(A[0], like), vector_of(A[1], like)
+    else:
+        return vector_of(A[0], like), vector_of(A[1], like), vector_of(A[2], like)
+
+
+@kernel
+def doubles(A):
+    """The matrix A in double precision."""
+    return numbers(A, np.float64(A[0][0]))
 
 
 @kernel

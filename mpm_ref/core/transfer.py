@@ -18,6 +18,7 @@ kernel is compiled.
 """
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .precision import converted, with_rounded_spacing
 from .relaxation import blend, blend_moment, moment, shift_spin
 from .state import affine, body_force, full, put_affine
 from .stencil import (
@@ -234,6 +235,7 @@ def p2g(particles, grid, stencil, dt, slabs, mls):
     Slabs of one colour are far enough apart to share no node, so they run in parallel; within a
     slab particles come in a fixed order. Hence the same bits for any number of threads.
     """
+    grid = with_rounded_spacing(grid)
     run = scatter_lines_mls_color if mls else scatter_lines_color
     if fits(grid, stencil, mls):
         run = scatter_mls3_color
@@ -245,6 +247,7 @@ def g2p(particles, grid, stencil, dt, flip, mls):
     """New velocity, position and velocity gradient of all particles; see `gather` and
     `gather_mls`.
     """
+    grid = with_rounded_spacing(grid)
     if fits(grid, stencil, mls):
         gather_mls3_all(particles, grid, stencil, dt)
     elif mls:
@@ -255,4 +258,4 @@ def g2p(particles, grid, stencil, dt, flip, mls):
 
 def rpic(C, damping):
     """`damp` for all particles."""
-    _damp(C, damping, tuple(range(C.shape[1])))
+    _damp(C, converted(damping, C.dtype.type), tuple(range(C.shape[1])))

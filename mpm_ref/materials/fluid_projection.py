@@ -6,7 +6,7 @@ NCLaw drops the rotation too, to which its fluid law is blind. Exponent 1/2 in 2
 from typing import NamedTuple
 
 from ..core.jit import kernel
-from ..core.tensor import fill, lin, total_of
+from ..core.tensor import fill, lin, number, total_of
 from .no_flow import never_fails
 from .stretches import inverse, volume
 
@@ -24,7 +24,7 @@ def build():
 def project(s, y, dt, law, flow):
     """Return J^(1/d) each, y as it is; s as it is unless J > 0."""
     J = volume(s)
-    return (fill(J ** (1.0 / len(s)), s) if J > 0.0 else s), y
+    return (fill(J ** (1.0 / number(len(s), J)), s) if J > 0.0 else s), y
 
 
 @kernel

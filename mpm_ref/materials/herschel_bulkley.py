@@ -15,7 +15,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from ..core.jit import kernel
-from ..core.tensor import dot, fill, lin, mul, norm, total_of
+from ..core.tensor import dot, fill, lin, mul, norm, number, total_of
 from .log_strain import deviator
 from .moduli import not_negative, yield_radius
 from .no_flow import never_fails
@@ -42,13 +42,14 @@ def project(s, y, dt, law, flow):
     J = volume(s)
     if not J > 0.0:
         return s, y
-    scale = J ** (2.0 / len(s))
+    d = number(len(s), J)
+    scale = J ** (2.0 / d)
     b_bar = lin(1.0 / scale, mul(s, s), 0.0, s)
     D = deviator(b_bar)
     size = law.mu * norm(D)
     if size > flow.tau_y:
         D = lin(relaxed(size, dt, law, flow) / size, D, 0.0, D)
-        b_bar = lin(1.0, D, unimodular_shift(D, total_of(b_bar) / len(s)), fill(1.0, s))
+        b_bar = lin(1.0, D, unimodular_shift(D, total_of(b_bar) / d), fill(1.0, s))
         s = roots(lin(scale, b_bar, 0.0, b_bar))
     return s, y
 

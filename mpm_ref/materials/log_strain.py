@@ -4,7 +4,7 @@ from math import exp, inf, log
 
 from ..core.jit import kernel
 from ..core.law import plastic_strain
-from ..core.tensor import fill, lin, norm, total_of
+from ..core.tensor import fill, lin, norm, number, total_of
 from .stretches import positive_stretches
 
 
@@ -34,7 +34,7 @@ def stretches(eps):
 @kernel
 def deviator(x):
     """Return the deviator x - mean(x); in 2D that of the plane (X-cross-15)."""
-    return lin(1.0, x, -total_of(x) / len(x), fill(1.0, x))
+    return lin(1.0, x, -total_of(x) / number(len(x), x[0]), fill(1.0, x))
 
 
 @kernel
@@ -73,7 +73,7 @@ def radial_return(s, y, dt, law, flow):
     eps = log_strain(lifted(s, flow.s_min))
     eps_hat = deviator(eps)
     size = norm(eps_hat)
-    dgamma, y, released = plastic_strain(len(s), total_of(eps), size, y, law, flow)
+    dgamma, y, released = plastic_strain(number(len(s), size), total_of(eps), size, y, law, flow)
     if released:
         return fill(1.0, s), y
     elif dgamma > 0.0:

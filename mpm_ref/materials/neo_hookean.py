@@ -28,6 +28,7 @@ from ..core.tensor import (
     mm,
     mmt,
     mul,
+    number,
     outer,
     transpose,
 )
@@ -72,8 +73,9 @@ def psi(F, law):
 @kernel
 def parts(J, tr_b, law, like):
     """Return m, t, A [Pa] with tau = m b + (A - t) I."""
-    m = law.mu * J ** (-2.0 / len(like))
-    return m, m * (tr_b / len(like)), 0.5 * law.kappa * (J * J - 1.0)
+    d = number(len(like), J)
+    m = law.mu * J ** (-2.0 / d)
+    return m, m * (tr_b / d), 0.5 * law.kappa * (J * J - 1.0)
 
 
 @kernel

@@ -38,7 +38,6 @@ STAGES = {          # of a step: beginnings of the names of the kernels that it 
     "return map": ("core.deform.plastic", "core.deform.radial", "core.deform.full"),
     "RPIC damping": ("core.transfer._damp",),
 }
-DOUBLE = 8          # bytes
 LONGEST = 600       # [s] that the first steps may take
 
 
@@ -62,14 +61,14 @@ class CodeParts:
 
     @property
     def numbers(self):
-        """Return {body: {field: doubles per particle}}."""
-        return {body: {name: size // (DOUBLE * self.particles[body])
+        """Return {body: {field: bytes per particle}}."""
+        return {body: {name: size // self.particles[body]
                        for name, size in fields.items()} for body, fields in self.arrays.items()}
 
     @property
     def facts(self):
         """Return the parts as plain values."""
-        return vars(self) | {"doubles_per_particle": self.numbers, "stages": self.stages}
+        return vars(self) | {"bytes_per_particle": self.numbers, "stages": self.stages}
 
 
 def table_rows(parts):
@@ -82,7 +81,7 @@ def table_rows(parts):
         return []
     rows = [("in the first steps", [str(column.steps) for column in columns])]
     for bodies in alike_bodies(columns[0]):
-        rows.append((f"doubles per particle of {', '.join(bodies)}", []))
+        rows.append((f"bytes per particle of {', '.join(bodies)}", []))
         fields = columns[0].numbers[bodies[0]]
         counts = [column.numbers.get(bodies[0], {}) for column in columns]
         rows += [(f"  {name}", [str(count.get(name, 0)) for count in counts]) for name in fields]
@@ -107,7 +106,7 @@ def table_lines(parts):
 
 
 def alike_bodies(parts):
-    """Return lists of bodies with the same numbers of doubles and the same SVD."""
+    """Return lists of bodies with the same sizes of fields and the same SVD."""
     groups = {}
     for body, numbers in parts.numbers.items():
         groups.setdefault((tuple(numbers.items()), parts.svd[body]), []).append(body)

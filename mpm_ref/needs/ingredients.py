@@ -128,9 +128,22 @@ def scheme_removals(scene):
                       ("f_bar", "averaged volumes (F-bar)")):
         if getattr(scheme, key):
             yield Removal(name, default_edit("scheme", key))
+    if can_be_single(scene):
+        yield Removal("double precision", to_single, "single")
     if scheme.degree > (2 if scheme.transfer in AFFINE else 1):
         yield Removal(f"splines of degree {scheme.degree}", degree_edit(scheme.degree - 1),
                       f"degree {scheme.degree - 1}")
+
+
+def can_be_single(scene):
+    """Return whether a scene is of double precision and could be of single."""
+    return scene.integrator == "explicit" and scene.scheme.precision == "double" and not any(
+        body.material.is_neural for body in scene.body)
+
+
+def to_single(tables):
+    """Store and compute in single precision."""
+    tables["scheme"]["precision"] = "single"
 
 
 def transfer_edit(text):

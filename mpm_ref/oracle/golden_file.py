@@ -149,6 +149,10 @@ def require_recordable(problem):
     if problem.contacts:
         raise ValueError("contact of bodies: golden files have one velocity field; expected a "
                          "scene without it")
+    if problem.scheme.precision != "double":
+        raise ValueError(f"precision = {problem.scheme.precision!r}: golden files hold arrays of "
+                         "double precision; expected 'double', which any backend may be compared "
+                         "with")
     if problem.scheme.f_bar:
         raise ValueError("f_bar = true: golden files have no arrays of averaged volumes; expected "
                          "a scene with f_bar = false")

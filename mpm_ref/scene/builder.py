@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..body import AFFINE, Body, particles_at, with_separate_gradient
+from ..body import AFFINE, Body, in_precision, particles_at, with_separate_gradient
 from ..body_contact import BodyContact, check_contacts
 from ..core import motion as rigid
 from ..core.boundary import BoxWalls, Conditions, Prescribed
@@ -46,11 +46,20 @@ class SceneParts(NamedTuple):
 
 def build_parts(scene):
     """Return the `SceneParts` of a scene. Raises SceneError for a part that cannot be built."""
+    check_precision(scene)
     materials = tuple(build_material(body, scene.dim, k) for k, body in enumerate(scene.body))
     return SceneParts(build_clock(scene), build_limits(scene), build_conditions(scene),
                       build_solver(scene), build_contacts(scene), tuple(
                           None if record.material.is_neural else (law, flow)
                           for record, (law, flow, _) in zip(scene.body, materials)))
+
+
+def check_precision(scene):
+    """Raise SceneError where a scene of single precision has a part that only double has."""
+    neural = [body.name for body in scene.body if body.material.is_neural]
+    if scene.scheme.precision == "single" and neural:
+        raise SceneError('scheme.precision = "single": the learned law of body '
+                         f'{neural[0]!r} computes in double; expected "double"')
 
 
 def build_material(body, dim, k):
@@ -93,6 +102,7 @@ def build_body(scene, k, material, arrays=None):
         particles = _sampled(scene, record, material, (path, [scene.seed, k]))
     else:
         particles = _particles_of(scene, record, material, (path, arrays))
+    particles = in_precision(particles, scene.step_scheme.real)
     return Body(record.name, particles, *material, np.arange(len(particles.x)))
 
 

@@ -12,6 +12,7 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
     transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic",
                 "mls relaxation 1e-3" (with its time in s, whatever the grid), ...
     f_bar       whether explicit steps average volumes over cells, against locking
+    precision   "double" or "single", of explicit steps
     integrator  "explicit", or the word of an implicit method such as "hot-plus"
     eps         tolerance of an implicit step
     boundary    "nodes" or "surface": where the conditions of colliders hold
@@ -199,7 +200,8 @@ def change_transfer(tables, text):
 
 def change_integrator(tables, word):
     """Step explicitly, or by an implicit method, whose transfer is APIC unless it is chosen, which
-    averages no volumes and does not relax, and whose conditions hold at nodes.
+    averages no volumes and does not relax, in double precision, and whose conditions hold at
+    nodes.
     """
     tables["integrator"] = word
     if word == "explicit":
@@ -207,7 +209,7 @@ def change_integrator(tables, word):
         tables.pop("longest", None)
         return
     tables["boundary"] = "nodes"
-    tables["scheme"] |= {"f_bar": False, "relaxation": 0.0}
+    tables["scheme"] |= {"f_bar": False, "relaxation": 0.0, "precision": "double"}
     if tables["scheme"].get("transfer") in (None, "mls"):
         tables["scheme"]["transfer"] = "apic"
 
@@ -218,6 +220,14 @@ def change_f_bar(tables, averaged):
         raise SceneError("f_bar = true: implicit steps average no volumes; expected an explicit "
                          "integrator")
     tables["scheme"]["f_bar"] = averaged
+
+
+def change_precision(tables, precision):
+    """Store and compute in floats of another size."""
+    if precision == "single" and tables["integrator"] != "explicit":
+        raise SceneError('precision = "single": implicit steps compute in double; expected an '
+                         "explicit integrator")
+    tables["scheme"]["precision"] = precision
 
 
 def change_eps(tables, eps):
@@ -237,7 +247,7 @@ def change_boundary(tables, boundary):
 CHANGES = {
     "dx": scale_dx, "particles": scale_particles, "sampling": change_sampling,
     "integrator": change_integrator, "cfl": change_cfl, "degree": change_degree,
-    "transfer": change_transfer, "f_bar": change_f_bar, "eps": change_eps,
-    "boundary": change_boundary,
+    "transfer": change_transfer, "f_bar": change_f_bar, "precision": change_precision,
+    "eps": change_eps, "boundary": change_boundary,
 }
 KNOBS = ("scene", *CHANGES)

@@ -30,7 +30,7 @@ def single_knobs(scene):
     if scene.collider and scene.integrator == "explicit":
         settings += [setting(boundary="nodes" if scene.boundary == "surface" else "surface")]
     if scene.integrator == "explicit":
-        settings += volume_settings(scene)
+        settings += [*volume_settings(scene), *precision_settings(scene)]
     else:
         solver = scene.solver
         tolerance = TOLERANCES[-1] if solver is None or solver.eps is None else solver.eps
@@ -68,6 +68,14 @@ def volume_settings(scene):
         return [setting(f_bar=False)]
     ratios = [body.material.nu or 0.0 for body in scene.body]
     return [setting(f_bar=True)] if max(ratios) >= LOCKING else []
+
+
+def precision_settings(scene):
+    """Return the setting with the other precision, for scenes without a learned law."""
+    if any(body.material.is_neural for body in scene.body):
+        return []
+    other = "double" if scene.scheme.precision == "single" else "single"
+    return [setting(precision=other)]
 
 
 def with_degree(degree, transfer):

@@ -33,6 +33,7 @@ class StoredSetting(msgspec.Struct, forbid_unknown_fields=True):
     degree: int | UnsetType = UNSET
     transfer: Word | UnsetType = UNSET
     f_bar: bool | UnsetType = UNSET
+    precision: Word | UnsetType = UNSET
     eps: Factor | UnsetType = UNSET
     boundary: Word | UnsetType = UNSET
 

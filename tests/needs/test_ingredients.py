@@ -47,6 +47,7 @@ def changed_keys(text, label):
     ("gravity on empty nodes", "gravity_on_empty", False),
     ("averaged volumes (F-bar)", "f_bar", False),
     ("splines of degree 3 (degree 2 instead)", "degree", 2),
+    ("double precision (single instead)", "precision", "single"),
 ])
 def test_removal_from_the_transfer(label, key, value):
     assert changed_keys(EXTRAS, label) == {"scheme"}

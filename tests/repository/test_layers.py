@@ -14,7 +14,7 @@ PACKAGES = {"plain", "materials", "materials.learned", "hot", "rom", "rom.study"
             "nclaw.study", "shapes", "sampling", "scene", "oracle", "cli", "executor", "sweep",
             "trade", "limits", "needs"}
 FLOORS = (
-    ("core.kernel_cache", "core.blas"),
+    ("core.kernel_cache", "core.precision", "core.blas"),
     ("core.jit",),
     ("core.tensor",),
     ("core.law", "core.spectral core.deflation core.scaling", "core.logarithm", "core.spline",

@@ -6,7 +6,7 @@ from math import inf
 import numpy as np
 from problems import DT, DX, JELLY, METAL, ball, digest, moving
 
-from mpm_ref.body import particles_at, with_separate_gradient
+from mpm_ref.body import in_precision, particles_at, with_separate_gradient
 from mpm_ref.core import sparse_grid
 from mpm_ref.core.sparse_grid import SparseStorage, is_sparse
 from mpm_ref.core.spline import STENCILS
@@ -76,6 +76,8 @@ def far_bodies(scheme=None, d=2, conditions=None, cells=20.0, speed=FAST):
     if scheme.relaxation:
         bodies = tuple(body._replace(particles=with_separate_gradient(body.particles))
                        for body in bodies)
+    bodies = tuple(body._replace(particles=in_precision(body.particles, scheme.real))
+                   for body in bodies)
     return Problem(bodies, DX, Clock(dt=DT, steps=300), -9.8 * up, scheme, conditions)
 
 

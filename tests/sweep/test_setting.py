@@ -69,6 +69,16 @@ def test_knobs_change_what_they_name():
         scene_at(scene, setting(eps=1e-3))
 
 
+def test_precision_is_a_knob_of_explicit_scenes():
+    scene = scene_of(BOUNCE)
+    rounded = scene_at(scene, setting(precision="single"))
+    assert rounded.step_scheme.precision == "single"
+    assert scene_at(rounded, setting(precision="double")).step_scheme.precision == "double"
+    assert scene_at(rounded, setting(integrator="hot-plus")).step_scheme.precision == "double"
+    with pytest.raises(SceneError, match="implicit steps compute in double"):
+        scene_at(scene, setting(integrator="hot-plus", precision="single"))
+
+
 def test_boundary_is_a_knob_of_scenes_with_colliders():
     scene = scene_of(BOUNCE)
     at_surface = scene_at(scene, setting(boundary="surface"))

@@ -205,6 +205,14 @@ def test_averaged_volumes_are_tried_near_incompressibility():
         assert [text for text in texts if "f_bar" in text] == expected
 
 
+def test_the_other_precision_is_tried_in_explicit_scenes():
+    single, implicit = 'scheme = { precision = "single" }' + FLIGHT, 'integrator = "hot"' + FLIGHT
+    for text, expected in ((FLIGHT, ["precision single"]), (single, ["precision double"]),
+                           (implicit, [])):
+        texts = [one.text for one in single_knobs(loads(text))]
+        assert [text for text in texts if "precision" in text] == expected
+
+
 @pytest.mark.parametrize(("scheme", "given", "other"), [
     ('transfer = "mls", relaxation = 0.005', "transfer mls relaxation 0.005", "transfer mls"),
     ('transfer = "apic", rpic = 0.1', "transfer apic rpic 0.1", "transfer apic"),

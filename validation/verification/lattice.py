@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mpm_ref.body import Body, particles_at, with_separate_gradient
+from mpm_ref.body import Body, in_precision, particles_at, with_separate_gradient
 from mpm_ref.core.boundary import BoxWalls, Conditions
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import Fluid, NoFlow
@@ -29,9 +29,10 @@ def body(X, spacing, rho, law, transfer, fluid=False):
 
 def fitted(body, scheme):
     """Return a body whose arrays are those that an `explicit.Scheme` needs."""
-    if not scheme.relaxation:
-        return body
-    return body._replace(particles=with_separate_gradient(body.particles))
+    particles = in_precision(body.particles, scheme.real)
+    if scheme.relaxation:
+        particles = with_separate_gradient(particles)
+    return body._replace(particles=particles)
 
 
 class Periodic:

@@ -52,6 +52,7 @@ class MmsRun(NamedTuple):
     cfl: float = CFL
     crossings: float = 0.0      # relaxation of the transfer, in times dx/SOUND
     rpic: float = 0.0           # damping of the strain rate in C
+    precision: str = "double"
 
     @property
     def dt(self):
@@ -62,7 +63,8 @@ class MmsRun(NamedTuple):
     def scheme(self):
         """Return the `explicit.Scheme` of the run."""
         relaxation = self.crossings / (self.cells * SOUND)
-        return Scheme(self.degree, self.transfer, rpic=self.rpic, relaxation=relaxation)
+        return Scheme(self.degree, self.transfer, rpic=self.rpic, relaxation=relaxation,
+                      precision=self.precision)
 
     @property
     def steps(self):
