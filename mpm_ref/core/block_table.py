@@ -33,7 +33,7 @@ def block_of(node):
 
 @kernel
 def is_row_of(table, row, block):
-    """Whether a row is that of a block."""
+    """Return whether a row is that of a block."""
     for a in range(len(block)):
         if table[row, a] != block[a]:
             return False

@@ -55,7 +55,7 @@ def extent(x):
     return low.min(axis=0), high.max(axis=0)
 
 
-class NodeBox(NamedTuple):
+class GridBox(NamedTuple):
     """A box of nodes."""
 
     first: np.ndarray       # (d,)  index of its first node, from the world's origin
@@ -82,7 +82,7 @@ class Storage:
         return self.zeroed(self.box(clouds))
 
     def box(self, clouds):
-        """Return the `NodeBox` of the points of `clouds`. Raises OutOfRange as `cover` does, but
+        """Return the `GridBox` of the points of `clouds`. Raises OutOfRange as `cover` does, but
         for its size.
         """
         extents = [extent(x) for x in clouds]
@@ -97,18 +97,18 @@ class Storage:
         first = self._base(low)
         first[0] -= first[0] % (2 * slab_width(self.stencil))     # see `order`
         shape = tuple(map(int, self._base(high) + len(self.stencil) - first))
-        return NodeBox(first, shape, low.dtype.type)
+        return GridBox(first, shape, low.dtype.type)
 
     def bytes(self, shape, box):
-        """Return the memory [bytes] of arrays of a shape, for the matter in a `NodeBox`."""
+        """Return the memory [bytes] of arrays of a shape, for the matter in a `GridBox`."""
         return np.dtype(box.real).itemsize * prod(shape) * (1 + self.vectors * self.dim)
 
     def zeroed(self, box):
-        """Return the zeroed dense grid of a `NodeBox`. Raises OutOfRange as `fields`."""
+        """Return the zeroed dense grid of a `GridBox`. Raises OutOfRange as `fields`."""
         return Grid(*self.fields(box.shape, box), box.first, self.dx)
 
     def fields(self, shape, box):
-        """Return zeroed arrays m, v, f, v_old of a shape, for the matter in a `NodeBox`. Raises
+        """Return zeroed arrays m, v, f, v_old of a shape, for the matter in a `GridBox`. Raises
         OutOfRange where they would need more than MAX_BYTES.
         """
         size = prod(shape)
