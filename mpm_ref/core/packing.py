@@ -26,7 +26,7 @@ def put_on_shelves(room, order, axes, limit, place):
                 cursor[axes[j - 1]] += thickness[axes[j - 1]]
                 thickness[axes[j - 1]] = 0
                 for a in axes[j:]:
-                    cursor[a], thickness[a] = 0, 0
+                    cursor[a] = 0
         place[k] = cursor
         cursor[axes[d - 1]] += room[k, axes[d - 1]]
         for a in axes[: d - 1]:

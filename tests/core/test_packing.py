@@ -48,3 +48,9 @@ def test_small_boxes_do_not_lie_behind_each_other_beside_a_large_one(d):
     room = np.concatenate([np.full((1, d), 64), np.full((8**d, d), 8)])
     shape = (pack(room, 0) + room).max(axis=0)
     assert shape.prod() < 2 * room.prod(axis=1).sum()
+
+
+def test_a_row_is_as_thick_as_its_own_boxes():
+    """Of 31 boxes the first fills a layer, and nine of the others, which are thin, fill one."""
+    room = np.array([(2, 9, 9)] + 30 * [(2, 1, 9)])
+    assert tuple((pack(room, 0) + room).max(axis=0)) == (10, 9, 9)
