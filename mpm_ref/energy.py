@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .core.deform import recall
-from .core.jit import CHUNKS, chunk, kernel, parallel, prange, total
+from .core.jit import CHUNKS, chunk, kernel, parallel_if_many, prange, total
 from .core.law import intact, psi, psi_volume
 from .core.tensor import mat
 
@@ -38,13 +38,13 @@ def _psi_fluid(particles, law, out, bounds):
         out[p] = particles.V0[p] * psi_volume(particles.F[p], law)
 
 
-@parallel
+@parallel_if_many
 def _psi_all(particles, law, flow, out, like):
     for c in prange(CHUNKS):
         _psi(particles, law, flow, out, like, chunk(c, len(out)))
 
 
-@parallel
+@parallel_if_many
 def _psi_fluid_all(particles, law, out):
     for c in prange(CHUNKS):
         _psi_fluid(particles, law, out, chunk(c, len(out)))

@@ -15,6 +15,7 @@ import numpy as np
 from .body import AFFINE, check_fit, permute
 from .core import deform
 from .core.f_bar import NODES, averaged
+from .core.gimp import gimp_stencil
 from .core.grid import Storage, update
 from .core.law import returned
 from .core.order import by_cell, slabs_of
@@ -25,6 +26,7 @@ from .core.transfer import g2p, p2g, rpic
 from .materials import NoFlow
 
 TRANSFERS = ("pic", "flip", "apic", "mls")
+MOST_PER_CELL = 100     # particles of GIMP per cell and axis: thinner ones are points
 
 
 @dataclass(frozen=True)
@@ -35,9 +37,10 @@ class Scheme:
     of FLIP (1) against PIC (0); rpic in [0, 1] damps the strain rate in C (NSF-rpic); relaxation
     [s] is the time in which v and C of the particles relax to those of the grid, 0 for at once;
     mass_eps [kg] and gravity_on_empty are NCLAW's, the latter without effect on particles; f_bar
-    averages the growth of volume over cells, against locking (see `core.f_bar`); precision "single"
-    stores and computes in floats of 4 bytes. Raises ValueError for a combination that does not
-    exist.
+    averages the growth of volume over cells, against locking (see `core.f_bar`); gimp, if not 0, is
+    the number of particles per cell and axis over whose lengths linear splines are averaged, in
+    place of a spline (see `core.gimp`); precision "single" stores and computes in floats of 4
+    bytes. Raises ValueError for a combination that does not exist.
     """
 
     degree: int = 2
@@ -48,6 +51,7 @@ class Scheme:
     mass_eps: float = 0.0
     gravity_on_empty: bool = False
     f_bar: bool = False
+    gimp: float = 0.0
     precision: str = "double"
 
     def __post_init__(self):
@@ -77,6 +81,20 @@ class Scheme:
         if self.mass_eps and self.transfer == "flip":
             raise ValueError("mass_eps with transfer 'flip': take it with pic, apic or mls")
         self._check_relaxation()
+        self._check_gimp()
+
+    def _check_gimp(self):
+        if self.gimp and not 1.0 <= self.gimp <= MOST_PER_CELL:
+            raise ValueError(f"gimp = {self.gimp}: expected the number of particles per cell and "
+                             f"axis, from 1 to {MOST_PER_CELL}, or 0 for splines")
+        if self.gimp and self.degree != 2:
+            raise ValueError(f"gimp = {self.gimp} with degree = {self.degree}: it averages linear "
+                             "splines, which gives weights of degree 2; leave degree out")
+        if self.gimp and self.affine:
+            raise ValueError(
+                f"gimp = {self.gimp} with transfer {self.transfer!r}: the moment sum_i w_ip r_ip "
+                "r_ip^T of GIMP varies with the place in a cell; take the transfer 'pic' or 'flip'"
+            )
 
     def _check_relaxation(self):
         if not 0.0 <= self.relaxation < inf:
@@ -119,7 +137,9 @@ class Scheme:
 
     @property
     def stencil(self):
-        """Offsets (0, .., degree) of the nodes that a particle reaches, per axis."""
+        """Offsets (0, .., degree) of the nodes that a particle reaches, per axis, or a `Gimp`."""
+        if self.gimp:
+            return converted(gimp_stencil(self.gimp), self.real)
         return STENCILS[self.degree]
 
 

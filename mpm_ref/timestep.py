@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .core.jit import CHUNKS, chunk, kernel, parallel, prange
+from .core.jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .core.law import kirchhoff_hat
 from .core.spectral import svd
 from .core.stencil import (
@@ -108,13 +108,13 @@ def _fluid_moduli(J, law, wave, largest, like, bounds):
         largest[p] = largest_modulus(s, law)
 
 
-@parallel
+@parallel_if_many
 def _all_solid_moduli(F, law, wave, largest, like):
     for c in prange(CHUNKS):
         _solid_moduli(F, law, wave, largest, like, chunk(c, len(wave)))
 
 
-@parallel
+@parallel_if_many
 def _all_fluid_moduli(J, law, wave, largest, like):
     for c in prange(CHUNKS):
         _fluid_moduli(J, law, wave, largest, like, chunk(c, len(wave)))
@@ -171,7 +171,7 @@ def largest_of(a):
     return most
 
 
-@parallel
+@parallel_if_many
 def _couplings(particles, grid, stencil, S):
     for c in prange(CHUNKS):
         _coupling(particles, grid, stencil, S, chunk(c, len(S)))

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .order import slabs_of
 from .stencil import (
     column,
@@ -137,7 +137,7 @@ def shares_near(nodes, bodies, grid, stencil):
 def bases_of(nodes, shape, stencil):
     """Return the mask over a grid's nodes of those from which a stencil reaches one of `nodes`."""
     mask, at = np.zeros(shape, dtype=np.bool_), np.stack(np.unravel_index(nodes, shape))
-    for offset in tuples(stencil, repeat=len(shape)):
+    for offset in tuples(range(len(stencil)), repeat=len(shape)):
         base = at - np.array(offset)[:, None]
         mask[tuple(base[:, (base >= 0).all(axis=0)])] = True
     return mask
@@ -235,13 +235,13 @@ def stick(one, two, like, bounds):
         put_vec(two.v, j, v)
 
 
-@parallel
+@parallel_if_many
 def _mark_all(x, grid, stencil, bases, marks):
     for c in prange(CHUNKS):
         mark(x, grid, stencil, bases, marks, chunk(c, len(x)))
 
 
-@parallel
+@parallel_if_many
 def _collect_color(points, grid, stencil, slabs, shares, color):
     for h in prange((len(slabs.start) - color) // 2):
         a = 2 * h + color
@@ -249,13 +249,13 @@ def _collect_color(points, grid, stencil, slabs, shares, color):
         collect(points, grid, stencil, members, shares)
 
 
-@parallel
+@parallel_if_many
 def _separate_all(one, two, law, like):
     for c in prange(CHUNKS):
         separate(one, two, law, like, chunk(c, len(one.node)))
 
 
-@parallel
+@parallel_if_many
 def _stick_all(one, two, like):
     for c in prange(CHUNKS):
         stick(one, two, like, chunk(c, len(one.node)))

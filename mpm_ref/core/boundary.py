@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .contact import NOSLIP, PRESCRIBED, SEPARATE, SLIP, STICKY, Contacts, meet
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .levelset import distances, normals
 from .mass_nodes import in_order_of_space, nodes_beyond, nodes_with_mass, place, selected
 from .motion import STILL, Motion
@@ -320,13 +320,13 @@ def add_impulses(contacts, m, J, bounds):
             J[contacts.part[k], a] += m[contacts.node[k]] * contacts.dv[k, a]
 
 
-@parallel
+@parallel_if_many
 def _pull_back_all(nodes, region, X):
     for c in prange(CHUNKS):
         pull_back(nodes, region, X, chunk(c, len(X)))
 
 
-@parallel
+@parallel_if_many
 def _settle_all(contacts, start, v, like):
     for c in prange(CHUNKS):
         settle(contacts, start, v, like, chunk(c, len(start) - 1))

@@ -12,7 +12,7 @@ are moderate: eps = log(F_trial F_trial^T)/2 becomes eps_new, F = exp(eps_new - 
 
 from math import sqrt
 
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .law import (
     intact,
     kirchhoff,
@@ -164,21 +164,21 @@ def remember(y, p, value):
         y[p] = value
 
 
-@parallel
+@parallel_if_many
 def fluid(particles, law, dt, like):
     """`deform_fluid` for all particles. `like` is any tuple of length d."""
     for c in prange(CHUNKS):
         deform_fluid(particles, law, dt, like, chunk(c, len(particles.x)))
 
 
-@parallel
+@parallel_if_many
 def elastic(particles, law, dt, like):
     """`deform_elastic` for all particles. `like` is any tuple of length d."""
     for c in prange(CHUNKS):
         deform_elastic(particles, law, dt, like, chunk(c, len(particles.x)))
 
 
-@parallel
+@parallel_if_many
 def plastic(particles, law, flow, dt, like):
     """`deform_plastic` for all particles. `like` is any tuple of length d."""
     for c in prange(CHUNKS):
@@ -190,14 +190,14 @@ def is_radial(law, flow):
     return type(law) in kirchhoff_of_strain.methods and type(flow) in plastic_strain.methods
 
 
-@parallel
+@parallel_if_many
 def radial(particles, law, flow, dt, like):
     """`deform_radial` for all particles. `like` is any tuple of length d."""
     for c in prange(CHUNKS):
         deform_radial(particles, law, flow, dt, like, chunk(c, len(particles.x)))
 
 
-@parallel
+@parallel_if_many
 def full(particles, law, flow, dt, like):
     """`deform_full` for all particles. `like` is any tuple of length d."""
     for c in prange(CHUNKS):

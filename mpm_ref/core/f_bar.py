@@ -21,7 +21,7 @@ next an alternating field averages out at every u, so that no checkerboard of th
 import numpy as np
 
 from .deform import growth
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .order import slabs_of
 from .precision import converted, with_rounded_spacing
 from .spline import STENCILS
@@ -89,7 +89,7 @@ def gather_growth(particles, cells, grown, dt, Lbar, bounds):
         put_mat(Lbar, p, mlin(1.0 / dt, G, -1.0 / dt, identity(d)))
 
 
-@parallel
+@parallel_if_many
 def _scatter_color(particles, cells, grown, dt, slabs, color):
     for h in prange((len(slabs.start) - color) // 2):
         a = 2 * h + color
@@ -97,7 +97,7 @@ def _scatter_color(particles, cells, grown, dt, slabs, color):
         scatter_growth(particles, cells, grown, dt, members)
 
 
-@parallel
+@parallel_if_many
 def _gather(particles, cells, grown, dt, Lbar):
     for c in prange(CHUNKS):
         gather_growth(particles, cells, grown, dt, Lbar, chunk(c, len(particles.x)))

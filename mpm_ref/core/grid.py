@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .order import slab_width
 from .precision import converted
 from .spline import base_of
@@ -35,7 +35,7 @@ def _extent(x, low, high, bad, bounds):
             high[a] = max(high[a], x[p, a])
 
 
-@parallel
+@parallel_if_many
 def _extents(x, low, high, bad):
     for c in prange(CHUNKS):
         _extent(x, low[c], high[c], bad[c], chunk(c, len(x)))
@@ -166,19 +166,19 @@ def _update_empty(nodes, gravity, dt, bounds):
                 nodes.v[i, a] = dt * gravity[a]
 
 
-@parallel
+@parallel_if_many
 def _update_all(nodes, gravity, dt, eps):
     for c in prange(CHUNKS):
         _update(nodes, gravity, dt, eps, chunk(c, len(nodes.m)))
 
 
-@parallel
+@parallel_if_many
 def _update_all_apart(nodes, gravity, dt):
     for c in prange(CHUNKS):
         _update_apart(nodes, gravity, dt, chunk(c, len(nodes.m)))
 
 
-@parallel
+@parallel_if_many
 def _update_all_empty(nodes, gravity, dt):
     for c in prange(CHUNKS):
         _update_empty(nodes, gravity, dt, chunk(c, len(nodes.m)))

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .block_table import EMPTY, SHIFT, block_of, empty_table, row_of
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .spline import base_of
 from .tensor import put_vec, vec
 
@@ -84,7 +84,7 @@ def put_runs(x, dx, stencil, runs, like, bounds):
     return n - bounds[0]
 
 
-@parallel
+@parallel_if_many
 def _put_all_runs(x, dx, stencil, runs, like, count):
     for c in prange(CHUNKS):
         count[c] = put_runs(x, dx, stencil, runs, like, chunk(c, len(x)))

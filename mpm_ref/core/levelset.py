@@ -17,7 +17,7 @@ from math import cos, sin
 
 import numpy as np
 
-from .jit import CHUNKS, by_type, chunk, kernel, parallel, prange
+from .jit import CHUNKS, by_type, chunk, kernel, parallel_if_many, prange
 from .solids import (
     Box,
     Capsule,
@@ -345,13 +345,13 @@ def _normals(x, shape, out, like, bounds):
         put_vec(out, p, normal(vec(x, p, like), shape))
 
 
-@parallel
+@parallel_if_many
 def _all_distances(x, shape, out, like):
     for c in prange(CHUNKS):
         _distances(x, shape, out, like, chunk(c, len(x)))
 
 
-@parallel
+@parallel_if_many
 def _all_normals(x, shape, out, like):
     for c in prange(CHUNKS):
         _normals(x, shape, out, like, chunk(c, len(x)))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .precision import converted, with_rounded_spacing
 from .spline import base_of
 from .stencil import locate
@@ -74,13 +74,13 @@ def _place(x, cut, stencil, at, order, bounds):
         at[a] += 1
 
 
-@parallel
+@parallel_if_many
 def _count_all(x, cut, stencil, count):
     for c in prange(CHUNKS):
         _count(x, cut, stencil, count[c], chunk(c, len(x)))
 
 
-@parallel
+@parallel_if_many
 def _place_all(x, cut, stencil, at, order):
     for c in prange(CHUNKS):
         _place(x, cut, stencil, at[c], order, chunk(c, len(x)))

@@ -1,14 +1,37 @@
 """B-splines of degree 1, 2, 3 on a grid of spacing dx, and the nodes they reach.
 
 The degree is the length of `stencil` minus one: (0, 1), (0, 1, 2), (0, 1, 2, 3) are the offsets
-of the nodes that a point reaches from its base node, per axis.
+of the nodes that a point reaches from its base node, per axis. A stencil `Gimp` reaches the nodes
+of degree 2, with other weights.
 """
 
 from math import floor
 
-from .jit import kernel
+from .gimp import Gimp, gimp_slopes, gimp_weights
+from .jit import by_type, kernel
 
 STENCILS = {1: (0, 1), 2: (0, 1, 2), 3: (0, 1, 2, 3)}
+
+three_weights = by_type("three_weights")        # (f, stencil) -> weights of three nodes
+three_slopes = by_type("three_slopes")          # (f, stencil) -> slopes of three nodes
+
+
+@kernel
+def quadratic_weights(f, stencil):
+    """Weights of the quadratic B-splines; see `weights`."""
+    return 0.5 * (1.5 - f) ** 2, 0.75 - (f - 1.0) ** 2, 0.5 * (f - 0.5) ** 2
+
+
+@kernel
+def quadratic_slopes(f, stencil):
+    """Slopes of the quadratic B-splines; see `slopes`."""
+    return f - 1.5, 2.0 - 2.0 * f, f - 0.5
+
+
+three_weights.method(tuple, quadratic_weights)
+three_weights.method(Gimp, gimp_weights)
+three_slopes.method(tuple, quadratic_slopes)
+three_slopes.method(Gimp, gimp_slopes)
 
 
 @kernel
@@ -25,7 +48,7 @@ def weights(f, stencil):
     if len(stencil) == 2:
         return 1.0 - f, f
     elif len(stencil) == 3:
-        return 0.5 * (1.5 - f) ** 2, 0.75 - (f - 1.0) ** 2, 0.5 * (f - 0.5) ** 2
+        return three_weights(f, stencil)
     else:
         return (
             (2.0 - f) ** 3 / 6.0,
@@ -41,7 +64,7 @@ def slopes(f, stencil):
     if len(stencil) == 2:
         return -1.0, 1.0
     elif len(stencil) == 3:
-        return f - 1.5, 2.0 - 2.0 * f, f - 0.5
+        return three_slopes(f, stencil)
     else:
         return (
             -0.5 * (2.0 - f) ** 2,

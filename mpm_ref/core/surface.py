@@ -34,7 +34,7 @@ import numpy as np
 
 from .boundary import Conditions, nodes_with_mass, nodes_within, solve
 from .contact import ESCAPE, NOSLIP, SEPARATE, SLIP, STICKY
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .tensor import dot, fill, lin, norm, put_vec, vec
 
 NEAR = 0.75         # cells in front of a surface, up to which nodes carry its condition
@@ -379,7 +379,7 @@ def solve_impulses(points, rules, J, v, like):
     return not worst > GROWING
 
 
-@parallel
+@parallel_if_many
 def _attach_all(points, d, m):
     for c in prange(CHUNKS):
         attach(points, d, m, chunk(c, len(d)))

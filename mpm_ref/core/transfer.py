@@ -17,7 +17,7 @@ them. Which fields the particles and the grid carry (see `state`) selects the tr
 kernel is compiled.
 """
 
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .precision import converted, with_rounded_spacing
 from .relaxation import blend, blend_moment, moment, shift_spin
 from .state import affine, body_force, full, put_affine
@@ -223,7 +223,7 @@ def damp(C, rpic, like, bounds):
         put_mat(C, p, mlin(1.0 - 0.5 * rpic, A, -0.5 * rpic, transpose(A)))
 
 
-@parallel
+@parallel_if_many
 def _damp(C, damping, like):
     for c in prange(CHUNKS):
         damp(C, damping, like, chunk(c, len(C)))
@@ -235,7 +235,7 @@ def p2g(particles, grid, stencil, dt, slabs, mls):
     Slabs of one colour are far enough apart to share no node, so they run in parallel; within a
     slab particles come in a fixed order. Hence the same bits for any number of threads.
     """
-    grid = with_rounded_spacing(grid)
+    grid, stencil = with_rounded_spacing(grid), converted(stencil, grid.v.dtype.type)
     run = scatter_lines_mls_color if mls else scatter_lines_color
     if fits(grid, stencil, mls):
         run = scatter_mls3_color
@@ -247,7 +247,7 @@ def g2p(particles, grid, stencil, dt, flip, mls):
     """New velocity, position and velocity gradient of all particles; see `gather` and
     `gather_mls`.
     """
-    grid = with_rounded_spacing(grid)
+    grid, stencil = with_rounded_spacing(grid), converted(stencil, grid.v.dtype.type)
     if fits(grid, stencil, mls):
         gather_mls3_all(particles, grid, stencil, dt)
     elif mls:

@@ -4,7 +4,7 @@ The same sums as `scatter`, `scatter_mls`, `gather` and `gather_mls` of `transfe
 nodes (see `lines`): in 3D from twice (MLS that relaxes) to 17 times (cubic PIC) as fast.
 """
 
-from .jit import CHUNKS, chunk, kernel, leaf, parallel, prange
+from .jit import CHUNKS, chunk, kernel, leaf, parallel_if_many, prange
 from .lines import (
     NodeLines,
     affine_rows,
@@ -165,7 +165,7 @@ def old_sums(C, v_old, nodes):
 
 # all particles
 
-@parallel
+@parallel_if_many
 def scatter_lines_color(particles, grid, stencil, dt, slabs, color):
     """`scatter_lines` for the slabs of one colour, in parallel."""
     for h in prange((len(slabs.start) - color) // 2):
@@ -174,7 +174,7 @@ def scatter_lines_color(particles, grid, stencil, dt, slabs, color):
         scatter_lines(particles, grid, stencil, dt, members)
 
 
-@parallel
+@parallel_if_many
 def scatter_lines_mls_color(particles, grid, stencil, dt, slabs, color):
     """`scatter_lines_mls` for the slabs of one colour, in parallel."""
     for h in prange((len(slabs.start) - color) // 2):
@@ -183,14 +183,14 @@ def scatter_lines_mls_color(particles, grid, stencil, dt, slabs, color):
         scatter_lines_mls(particles, grid, stencil, dt, members)
 
 
-@parallel
+@parallel_if_many
 def gather_lines_all(particles, grid, stencil, dt, flip):
     """`gather_lines` for all particles, in parallel."""
     for c in prange(CHUNKS):
         gather_lines(particles, grid, stencil, dt, flip, chunk(c, len(particles.x)))
 
 
-@parallel
+@parallel_if_many
 def gather_lines_mls_all(particles, grid, stencil, dt, flip):
     """`gather_lines_mls` for all particles, in parallel."""
     for c in prange(CHUNKS):

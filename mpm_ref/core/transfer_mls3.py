@@ -11,7 +11,7 @@ The same sums as `scatter_mls` and `gather_mls` of `transfer`, 2.5 times as fast
   and the entries of a line are no longer known to be consecutive.
 """
 
-from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .lines import _1, _2, _3, _4, _5, _6, _7, _8, node_number, strides
 from .state import affine, body_force, full, put_affine
 from .stencil import inverse_inertia, locate, weights_per_axis
@@ -131,7 +131,7 @@ def weighted(w, A, B, C):
     return mlin(1.0, mlin(w[0], A, w[1], B), w[2], C)
 
 
-@parallel
+@parallel_if_many
 def scatter_mls3_color(particles, grid, stencil, dt, slabs, color):
     """`scatter_mls3` for the slabs of one colour, in parallel."""
     for h in prange((len(slabs.start) - color) // 2):
@@ -140,7 +140,7 @@ def scatter_mls3_color(particles, grid, stencil, dt, slabs, color):
         scatter_mls3(particles, grid, stencil, dt, members)
 
 
-@parallel
+@parallel_if_many
 def gather_mls3_all(particles, grid, stencil, dt):
     """`gather_mls3` for all particles, in parallel."""
     for c in prange(CHUNKS):

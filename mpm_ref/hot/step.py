@@ -173,6 +173,9 @@ def check_scheme(scheme):
     if scheme.mass_eps or scheme.gravity_on_empty:
         raise ValueError("mass_eps and gravity_on_empty belong to explicit NCLaw scenes: leave "
                          "them out with an implicit integrator")
+    if scheme.gimp:
+        raise ValueError(f"gimp = {scheme.gimp} with an implicit integrator: its matrices are "
+                         "those of splines; expected gimp = 0, or integrator = \"explicit\"")
     if scheme.precision != "double":
         raise ValueError(f"precision = {scheme.precision!r} with an implicit integrator: expected "
                          "'double', which its sums of energies need")

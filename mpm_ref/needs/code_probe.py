@@ -76,10 +76,9 @@ def used_kernels():
         if name.split(".")[0] != PACKAGE:
             continue
         for value in list(vars(sys.modules[name]).values()):
-            entry = value._entry if isinstance(value, jit.Kernel) else value
-            forms = getattr(entry, "signatures", None)
-            if forms and hasattr(entry, "py_func"):
-                used[name_of(entry.py_func)] = len(forms)
+            forms = getattr(value, "signatures", None)
+            if forms and hasattr(value, "py_func"):
+                used[name_of(value.py_func)] = len(forms)
     return used
 
 

@@ -130,7 +130,9 @@ def scheme_removals(scene):
             yield Removal(name, default_edit("scheme", key))
     if can_be_single(scene):
         yield Removal("double precision", to_single, "single")
-    if scheme.degree > (2 if scheme.transfer in AFFINE else 1):
+    if scheme.gimp:
+        yield Removal("averages over particles (GIMP)", degree_edit(1), "linear splines")
+    elif scheme.degree > (2 if scheme.transfer in AFFINE else 1):
         yield Removal(f"splines of degree {scheme.degree}", degree_edit(scheme.degree - 1),
                       f"degree {scheme.degree - 1}")
 
@@ -154,7 +156,7 @@ def transfer_edit(text):
 def degree_edit(degree):
     """Return the edit to splines of another degree."""
     def edit(tables):
-        tables["scheme"]["degree"] = degree
+        tables["scheme"] |= {"degree": degree, "gimp": 0.0}
     return edit
 
 
@@ -193,6 +195,8 @@ def remove_points(tables):
             scale_points(sampling, FEWER_POINTS, tables["dim"], per_cell=False)
         else:
             sampling["per_cell"] = max(sampling["per_cell"] - 1, 1)
+    if tables["scheme"].get("gimp"):
+        tables["scheme"]["gimp"] = max(tables["scheme"]["gimp"] - 1.0, 1.0)
 
 
 def step_explicitly(tables):

@@ -156,6 +156,9 @@ def require_recordable(problem):
     if problem.scheme.f_bar:
         raise ValueError("f_bar = true: golden files have no arrays of averaged volumes; expected "
                          "a scene with f_bar = false")
+    if problem.scheme.gimp:
+        raise ValueError(f"gimp = {problem.scheme.gimp}: golden files have weights of splines; "
+                         "expected a scene with gimp = 0")
     for body in problem.bodies:
         for part, table in ((body.law, LAWS), (body.flow, FLOWS)):
             if type(part).__name__ not in table:

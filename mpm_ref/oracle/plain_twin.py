@@ -103,7 +103,7 @@ def method(problem, real):
     """Return the `Method` of the problem's scheme in a floating type."""
     s = problem.scheme
     return Method(real(problem.dx), s.degree, s.transfer, real(s.flip), real(s.rpic),
-                  real(s.relaxation), real(s.mass_eps), s.f_bar)
+                  real(s.relaxation), real(s.mass_eps), s.f_bar, real(s.gimp))
 
 
 def matter(body, real):

@@ -8,8 +8,8 @@ The modules share nothing with `core` or `materials`: B-splines come from their 
 values from Jacobi rotations, stresses from principal stretches. Every function works in any
 floating type, `np.longdouble` included.
 
-Read them in this order: `spline` (weights), `transfer` (the sums between particles and nodes),
-`laws` (elasticity), `flows` (plasticity), `boundary` (contact at the nodes), `surface` (contact
-between them), `body_contact` (of bodies with each other), `step` (one explicit step), `potential`
-(what an implicit step minimises); `tensors` has the singular value decomposition.
+Read them in this order: `spline` and `gimp` (weights), `transfer` (the sums between particles and
+nodes), `laws` (elasticity), `flows` (plasticity), `boundary` (contact at the nodes), `surface`
+(contact between them), `body_contact` (of bodies with each other), `step` (one explicit step),
+`potential` (what an implicit step minimises); `tensors` has the singular value decomposition.
 """

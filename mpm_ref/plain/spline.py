@@ -4,12 +4,15 @@ The weight of node i at particle p is a product over the axes a of a B-spline N 
 
     w_ip = prod_a N((x_p - x_i)_a / dx)
 
-with N centred on the node; its support is k + 1 cells long.
+with N centred on the node; its support is k + 1 cells long. GIMP has other N, on the nodes of
+degree 2 (see `gimp`).
 """
 
 from typing import NamedTuple
 
 import numpy as np
+
+from .gimp import averaged, averaged_slope
 
 
 def bspline(u, degree):
@@ -40,8 +43,19 @@ class Pairs(NamedTuple):
     r: np.ndarray        # (N, S, d)  r_ip = x_i - x_p [m]
 
 
-def pairs(x, dx, degree):
-    """Return the `Pairs` of particles at x (N, d) [m] with the nodes of a grid of spacing dx [m].
+def centred(u, degree, gimp=0):
+    """Return N and dN/du at positions u from a node [cells]: of the B-spline of a degree, or of
+    GIMP for a number `gimp` of particles per cell and axis.
+    """
+    if gimp:
+        return averaged(u, gimp), averaged_slope(u, gimp)
+    half = u.dtype.type(degree + 1) / 2
+    return bspline(u + half, degree), slope(u + half, degree)
+
+
+def pairs(x, dx, degree, gimp=0):
+    """Return the `Pairs` of particles at x (N, d) [m] with the nodes of a grid of spacing dx [m];
+    degree and gimp are those of `centred`.
 
     With u_a = (x_p - x_i)_a / dx the gradient is dw_ip,a = N'(u_a) prod_{b != a} N(u_b) / dx.
     """
@@ -49,6 +63,6 @@ def pairs(x, dx, degree):
     base = np.floor(x / dx - (half - 1)).astype(int)
     node = base[:, None] + np.array(list(np.ndindex(*d * (degree + 1,))))
     u = x[:, None] / dx - node.astype(x.dtype)
-    n, dn = bspline(u + half, degree), slope(u + half, degree)
+    n, dn = centred(u, degree, gimp)
     dw = [np.prod(np.where(np.arange(d) == a, dn, n), axis=-1) for a in range(d)]
     return Pairs(node, np.prod(n, axis=-1), np.stack(dw, axis=-1) / dx, -u * dx)

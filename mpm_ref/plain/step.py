@@ -51,6 +51,7 @@ class Method(NamedTuple):
     relaxation: float = 0   # time in which v and C relax to the grid [s]; 0: in each step
     mass_eps: float = 0     # see `transfer.grid_velocity` [kg]
     f_bar: bool = False     # whether volumes are averaged, see `f_bar`
+    gimp: float = 0         # particles per cell and axis of GIMP, see `gimp`; 0: B-splines
 
     @property
     def moment(self):
@@ -103,7 +104,7 @@ def step(bodies, method, gravity, dt, conditions=None):
     gravity is (d,) [m/s^2]; conditions(v, m, box) returns the nodal velocities that satisfy the
     boundary conditions. `new_state` gives each body at the end of the step.
     """
-    stencils = [pairs(q.x, method.dx, method.degree) for q in bodies]
+    stencils = [pairs(q.x, method.dx, method.degree, method.gimp) for q in bodies]
     nodes = particles_to_grid(bodies, stencils, method, gravity, dt)
     if conditions is not None:
         nodes = nodes._replace(v=conditions(nodes.v_free, nodes.m, nodes.box))

@@ -296,6 +296,7 @@ class Scheme(Record):
     mass_eps: NotNegative = 0.0                 # [kg]
     gravity_on_empty: bool = False
     f_bar: bool = False
+    gimp: NotNegative = 0.0                     # particles per cell and axis
     precision: Literal["double", "single"] = "double"
 
     def __post_init__(self):

@@ -42,8 +42,9 @@ class BadResults(ValueError):
 class Results:
     """A results file open for reading, as a context manager.
 
-    Attributes: title, dim, dx [m], gravity (d,), degree; time and dt [s], step (frames,); energy
-    (frames, 3) [J], see `ENERGIES`; bodies, their names; manifest, a dict. Raises `BadResults`.
+    Attributes: title, dim, dx [m], gravity (d,), degree, gimp; time and dt [s], step (frames,);
+    energy (frames, 3) [J], see `ENERGIES`; bodies, their names; manifest, a dict. Raises
+    `BadResults`.
     """
 
     def __init__(self, path):
@@ -69,6 +70,7 @@ class Results:
         self.title, self.dx = attrs["title"], float(attrs["dx"])
         self.dim = int(attrs["dim"])
         self.gravity, self.degree = attrs["gravity"], int(attrs["degree"])
+        self.gimp = float(attrs.get("gimp", 0.0))
         self.time, self.dt, self.step = (self.h5[name][()] for name in ("time", "dt", "step"))
         self.energy = self.h5["energy"][()]
         groups = self.h5["bodies"]

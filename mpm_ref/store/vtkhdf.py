@@ -109,7 +109,7 @@ def export_grid(results, out):
     Raises `NotWritten`, and `BadResults` without a frame or if v is not stored.
     """
     results.index(0)            # there must be a frame
-    scheme = Scheme(degree=results.degree, transfer="pic")
+    scheme = Scheme(results.degree, "pic", gimp=results.gimp)
     first, shape = _box(results, scheme)
     require_space(out, 16 * len(results) * int(np.prod(shape)))
     with replacing(out) as part, new_hdf5(part) as h5:

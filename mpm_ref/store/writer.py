@@ -190,6 +190,8 @@ def _lay_out(h5, problem, fields):
     h5.attrs.update(format=FORMAT, scene_sha256=scene_hash(problem), title=problem.title,
                     dim=problem.dim, dx=problem.dx, gravity=np.array(problem.gravity, dtype=float),
                     degree=scheme.degree, transfer=scheme.transfer)
+    if scheme.gimp:
+        h5.attrs["gimp"] = scheme.gimp
     for name, (kind, unit) in CLOCK.items():
         _series(h5, name, (), kind, 0).attrs["unit"] = unit
     _series(h5, "energy", (len(ENERGIES),), "f8", 0).attrs.update(unit="J", columns=list(ENERGIES))

@@ -11,6 +11,7 @@ A setting is a dictionary of some of these knobs; what it leaves out stays as th
     degree      of the B-spline: 1, 2 or 3
     transfer    "mls", "apic", "flip 0.95" (with its share of FLIP), "apic rpic 0.5", "pic",
                 "mls relaxation 1e-3" (with its time in s, whatever the grid), ...
+    gimp        particles per cell and axis over which linear splines are averaged; 0: B-splines
     f_bar       whether explicit steps average volumes over cells, against locking
     precision   "double" or "single", of explicit steps
     integrator  "explicit", or the word of an implicit method such as "hot-plus"
@@ -22,6 +23,7 @@ import re
 from dataclasses import dataclass
 from math import inf, isclose
 
+from ..body import AFFINE
 from ..scene import SceneError
 from ..scene.validate import plain, validate_scene
 
@@ -137,12 +139,14 @@ def _node_at(node, inner, factor):
 
 
 def scale_particles(tables, factor):
-    """Multiply the points per cell and axis of all bodies with a shape."""
+    """Multiply the points per cell and axis of all bodies with a shape, and those of GIMP."""
     shaped = [body for body in tables["body"] if body.get("shape") is not None]
     if not shaped:
         raise SceneError("particles: the bodies are arrays, whose number of particles is given")
     for body in shaped:
         scale_points(body["sampling"], factor, tables["dim"], per_cell=True)
+    if tables["scheme"].get("gimp"):
+        tables["scheme"]["gimp"] = max(round(tables["scheme"]["gimp"] * factor), 1)
 
 
 def scale_points(sampling, factor, dim, per_cell):
@@ -178,12 +182,12 @@ def change_cfl(tables, share):
 
 
 def change_degree(tables, degree):
-    """Take B-splines of another degree."""
-    tables["scheme"]["degree"] = degree
+    """Take B-splines of another degree, in place of GIMP too."""
+    tables["scheme"] |= {"degree": degree, "gimp": 0.0}
 
 
 def change_transfer(tables, text):
-    """Take another transfer, with its blend."""
+    """Take another transfer, with its blend; an affine one knows no GIMP."""
     number = r"([0-9.]+(?:e-?[0-9]+)?)"
     match = re.fullmatch(rf"(\w+)(?: {number}| (rpic|relaxation) {number})?", text)
     if match is None or (match[2] and match[1] != "flip"):
@@ -195,13 +199,20 @@ def change_transfer(tables, text):
         scheme[key] = float(value)
     if name == "flip" or key == "relaxation":
         scheme["mass_eps"] = 0.0
+    if name in AFFINE:
+        scheme["gimp"] = 0.0
     tables["scheme"] |= scheme
+
+
+def change_gimp(tables, per_cell):
+    """Average linear splines over so many particles per cell and axis, or take B-splines for 0."""
+    tables["scheme"]["gimp"] = per_cell
 
 
 def change_integrator(tables, word):
     """Step explicitly, or by an implicit method, whose transfer is APIC unless it is chosen, which
-    averages no volumes and does not relax, in double precision, and whose conditions hold at
-    nodes.
+    averages no volumes or splines and does not relax, in double precision, and whose conditions
+    hold at nodes.
     """
     tables["integrator"] = word
     if word == "explicit":
@@ -209,7 +220,7 @@ def change_integrator(tables, word):
         tables.pop("longest", None)
         return
     tables["boundary"] = "nodes"
-    tables["scheme"] |= {"f_bar": False, "relaxation": 0.0, "precision": "double"}
+    tables["scheme"] |= {"f_bar": False, "gimp": 0.0, "relaxation": 0.0, "precision": "double"}
     if tables["scheme"].get("transfer") in (None, "mls"):
         tables["scheme"]["transfer"] = "apic"
 
@@ -247,7 +258,7 @@ def change_boundary(tables, boundary):
 CHANGES = {
     "dx": scale_dx, "particles": scale_particles, "sampling": change_sampling,
     "integrator": change_integrator, "cfl": change_cfl, "degree": change_degree,
-    "transfer": change_transfer, "f_bar": change_f_bar, "precision": change_precision,
-    "eps": change_eps, "boundary": change_boundary,
+    "transfer": change_transfer, "gimp": change_gimp, "f_bar": change_f_bar,
+    "precision": change_precision, "eps": change_eps, "boundary": change_boundary,
 }
 KNOBS = ("scene", *CHANGES)

@@ -2,7 +2,7 @@
 
 from ..body import AFFINE
 from ..scene.crossing import crossing_time
-from ..sweep.setting import setting
+from ..sweep.setting import USUAL_PER_CELL, setting
 
 CFL, CELLS = (0.9, 0.5, 0.25), (0.9, 0.6, 0.3)      # of the explicit bound; of implicit steps
 PARTICLES = (0.5, 2 / 3, 1.5, 2.0)                  # per cell and axis, times the scene's
@@ -30,7 +30,7 @@ def single_knobs(scene):
     if scene.collider and scene.integrator == "explicit":
         settings += [setting(boundary="nodes" if scene.boundary == "surface" else "surface")]
     if scene.integrator == "explicit":
-        settings += [*volume_settings(scene), *precision_settings(scene)]
+        settings += [*volume_settings(scene), *gimp_settings(scene), *precision_settings(scene)]
     else:
         solver = scene.solver
         tolerance = TOLERANCES[-1] if solver is None or solver.eps is None else solver.eps
@@ -78,13 +78,29 @@ def precision_settings(scene):
     return [setting(precision=other)]
 
 
-def with_degree(degree, transfer):
-    """Return the setting of a degree; linear splines carry no affine field, so that an affine
-    transfer becomes FLIP.
+def gimp_settings(scene):
+    """Return the setting without GIMP where an explicit scene has it, else the one with it where
+    several points fill a cell along an axis; with one it is the quadratic spline.
     """
-    if degree == 1 and transfer in AFFINE:
-        return setting(degree=1, transfer="flip 0.95")
-    return setting(degree=degree)
+    if scene.scheme.gimp:
+        return [setting(gimp=0.0)]
+    numbers = [getattr(body.sampling, "per_cell", None) or USUAL_PER_CELL
+               for body in scene.body if body.shape is not None]
+    if not numbers or numbers[0] == 1:
+        return []
+    without_field = without_affine_field(scene.step_scheme.transfer)
+    return [setting(degree=2, gimp=float(numbers[0])) | without_field]
+
+
+def with_degree(degree, transfer):
+    """Return the setting of a degree; linear splines carry no affine field."""
+    chosen = setting(degree=degree)
+    return chosen | without_affine_field(transfer) if degree == 1 else chosen
+
+
+def without_affine_field(transfer):
+    """Return the setting in which an affine transfer becomes FLIP."""
+    return setting(transfer="flip 0.95") if transfer in AFFINE else setting()
 
 
 def other_samplings(scene):

@@ -32,6 +32,7 @@ class StoredSetting(msgspec.Struct, forbid_unknown_fields=True):
     cfl: Factor | UnsetType = UNSET
     degree: int | UnsetType = UNSET
     transfer: Word | UnsetType = UNSET
+    gimp: NotNegative | UnsetType = UNSET
     f_bar: bool | UnsetType = UNSET
     precision: Word | UnsetType = UNSET
     eps: Factor | UnsetType = UNSET

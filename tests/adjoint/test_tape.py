@@ -27,7 +27,7 @@ import json
 import numpy as np
 from adjoint_runs import dive, order
 KINDS = [("pic", 1), ("pic", 2), ("flip", 2), ("flip", 3), ("apic", 2), ("apic", 3), ("mls", 3),
-         ("apic", 3, 2e-3), ("mls", 2, 2e-3)]
+         ("apic", 3, 2e-3), ("mls", 2, 2e-3), ("pic", 2, 0.0, 2.0), ("flip", 2, 0.0, 2.0)]
 print(json.dumps({str(kind): order(dive(*kind), (1, 3), 1e-3 * 0.5**np.arange(4))
                   for kind in KINDS}))
 """

@@ -10,6 +10,7 @@ from mpm_ref.core.jit import set_threads
 from mpm_ref.explicit import Scheme
 
 STEPS, SORT = 100, 16
+SHARED = {"MPM_REF_FEW_ITEMS": "0"}      # threads share loops over any number of items
 
 CODE = f"""
 import json, numba
@@ -65,7 +66,7 @@ def test_relaxation_gives_the_same_bits_with_two_threads(transfer):
 
 
 def test_four_threads_give_the_same_bits(here):
-    sha, _, threads = run_python(CODE, NUMBA_NUM_THREADS="4")
+    sha, _, threads = run_python(CODE, NUMBA_NUM_THREADS="4", **SHARED)
     assert threads == 4
     assert sha == here
 
@@ -74,7 +75,7 @@ def test_four_threads_give_the_same_bits(here):
 def test_every_threading_layer_gives_the_same_bits(here, layer):
     if layer == "tbb" and not run_python(LOADS, NUMBA_THREADING_LAYER=layer):
         pytest.skip("the tbb library is not installed")
-    sha, used, _ = run_python(CODE, NUMBA_THREADING_LAYER=layer)
+    sha, used, _ = run_python(CODE, NUMBA_THREADING_LAYER=layer, **SHARED)
     assert used == layer
     assert sha == here
 

@@ -1,5 +1,8 @@
 """The folder of compiled kernels is named by the code that shapes them, and by nothing else."""
 
+from typing import NamedTuple
+
+import numpy as np
 import pytest
 
 from mpm_ref.core import jit
@@ -89,3 +92,45 @@ def test_a_folder_that_cannot_be_written_is_no_error(package):
     blocked = package.parent / "file"
     blocked.write_text("")
     assert jit._source_hash(package, blocked) == jit._source_hash(package, package.parent / "other")
+
+
+# drivers
+
+@jit.kernel
+def doubled(x, bounds):
+    for i in range(bounds[0], bounds[1]):
+        x[i] *= 2.0
+
+
+@jit.parallel_if_many
+def doubled_all(x):
+    for c in jit.prange(jit.CHUNKS):
+        doubled(x, jit.chunk(c, len(x)))
+
+
+class Rows(NamedTuple):
+    """Two arrays with a row for each item."""
+
+    x: np.ndarray
+    y: np.ndarray
+
+
+def test_few_items_start_no_threads(monkeypatch):
+    driver = jit.Driver(doubled_all.py_func)
+    few, many = np.ones(jit.few_items - 1), np.ones(jit.few_items)
+    driver(few)
+    assert (len(driver.serial.signatures), len(driver.threaded.signatures)) == (1, 0)
+    monkeypatch.setattr(jit.numba, "get_num_threads", lambda: 1)
+    driver(many)
+    assert len(driver.threaded.signatures) == 0
+    monkeypatch.setattr(jit.numba, "get_num_threads", lambda: 2)
+    driver(many)
+    assert len(driver.threaded.signatures) == 1
+    assert len(driver.signatures) == 1
+    assert set(few) == {2.0}
+    assert set(many) == {4.0}
+
+
+def test_items_are_the_rows_of_the_first_array():
+    x, y = np.ones((7, 3)), np.ones(2)
+    assert jit.item_count(x) == jit.item_count(Rows(x, y)) == jit.item_count((Rows(x, y), y)) == 7

@@ -160,7 +160,7 @@ def test_plain_python_equals_the_compiled_step():
 def test_every_transfer_equals_its_twin():
     """All transfers, degrees and dimensions, full and isotropic stress, with and without b."""
     found = run_python(TRANSFERS, **PLAIN)
-    assert len(found) == 56
+    assert len(found) == 64
     assert max(found.values()) < 3e-15
 
 

@@ -72,6 +72,7 @@ LINES = (
     Case("apic", 2, 3, fluid=True), Case("apic", 3, 2), Case("apic", 3, 3, relaxed=True),
     Case("flip", 3, 3, body_force=True), Case("mls", 2, 2, body_force=True), Case("mls", 3, 3),
     Case("mls", 2, 3, relaxed=True, body_force=True), Case("mls", 3, 2, relaxed=True),
+    Case("flip", 2, 3, body_force=True, gimp=2.0), Case("pic", 2, 2, gimp=3.0),
 )
 SUMS = {False: (scatter_lines, transfer.scatter, gather_lines, transfer.gather),
         True: (scatter_lines_mls, transfer.scatter_mls, gather_lines_mls, transfer.gather_mls)}

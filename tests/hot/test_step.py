@@ -198,6 +198,8 @@ def test_what_has_no_implicit_form_is_refused():
         ImplicitStepper(Scheme(), DX, 2, NOTHING)
     with pytest.raises(ValueError, match="f_bar = true with an implicit integrator"):
         ImplicitStepper(Scheme(transfer="apic", f_bar=True), DX, 2, NOTHING)
+    with pytest.raises(ValueError, match=r"gimp = 2.0 with an implicit integrator: its matrices"):
+        ImplicitStepper(Scheme(transfer="flip", gimp=2.0), DX, 2, NOTHING)
     body = block()
     driven = body._replace(particles=body.particles._replace(b=np.zeros((SIDE**2, 2))))
     with pytest.raises(ValueError, match="has body forces b of its own"):

@@ -59,6 +59,15 @@ def test_removal_of_the_relaxation():
     assert without(text, "relaxation of the transfer").scheme.relaxation == 0.0
 
 
+def test_gimp_falls_back_on_the_splines_that_it_averages():
+    text = HEAD + 'scheme = { transfer = "flip", gimp = 2 }' + BLOCK
+    assert not any("degree" in label for label in variant_of(text).offers)
+    scheme = without(text, "averages over particles (GIMP) (linear splines instead)").scheme
+    assert (scheme.degree, scheme.gimp) == (1, 0.0)
+    fewer = without(text, "particles, 2 per cell and axis (fewer instead)")
+    assert (fewer.body[0].sampling.per_cell, fewer.scheme.gimp) == (1, 1.0)
+
+
 def test_flip_part_and_degree_of_a_transfer_without_affine_field():
     text = HEAD + 'scheme = { transfer = "flip", flip = 0.9 }' + BLOCK
     offers = variant_of(text).offers

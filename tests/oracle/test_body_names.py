@@ -44,6 +44,12 @@ def test_averaged_volumes_are_refused(tmp_path):
         oracle.record(problem, tmp_path / "golden.h5", 1)
 
 
+def test_gimp_is_refused(tmp_path):
+    problem = replace(stretched(), scheme=Scheme(transfer="pic", gimp=2.0))
+    with pytest.raises(ValueError, match=r"gimp = 2.0: golden files have weights of splines"):
+        oracle.record(problem, tmp_path / "golden.h5", 1)
+
+
 def test_conditions_at_surfaces_are_refused(tmp_path):
     floor = SurfaceConditions((Collider(half_space((0.0, 0.0), (0.0, 1.0))),))
     with pytest.raises(ValueError, match=r'boundary = "surface": expected "nodes" for adj'):

@@ -16,7 +16,7 @@ PACKAGES = {"plain", "materials", "materials.learned", "hot", "rom", "rom.study"
 FLOORS = (
     ("core.kernel_cache", "core.precision", "core.blas"),
     ("core.jit",),
-    ("core.tensor", "core.block_table", "core.packing"),
+    ("core.tensor", "core.gimp", "core.block_table", "core.packing"),
     ("core.law", "core.spectral core.deflation core.scaling", "core.logarithm", "core.spline",
      "core.solids"),
     ("core.stencil", "core.state", "core.lines", "core.islands"),

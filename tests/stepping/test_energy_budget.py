@@ -18,7 +18,8 @@ MATERIALS = {
 TRANSFERS = ('transfer = "mls"', 'transfer = "mls"\nmass_eps = 0.1',
              'transfer = "apic"', 'transfer = "apic"\nrpic = 0.5',
              'transfer = "apic"\nrelaxation = 0.01', 'transfer = "mls"\nrelaxation = 0.01',
-             'transfer = "flip"\nflip = 0.9', 'transfer = "pic"', 'transfer = "apic"\nf_bar = true')
+             'transfer = "flip"\nflip = 0.9', 'transfer = "pic"', 'transfer = "apic"\nf_bar = true',
+             'transfer = "flip"\nflip = 0.9\ngimp = 2')
 
 
 def scene_text(material="elastic", transfer='transfer = "mls"', extra="", cfl=0.4, end=0.2):

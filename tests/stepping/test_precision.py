@@ -32,6 +32,8 @@ SCHEMES = {
     "flip": Scheme(2, "flip", flip=0.95),
     "linear": Scheme(1, "flip", flip=0.95),
     "pic": Scheme(3, "pic"),
+    "gimp": Scheme(2, "flip", flip=0.95, gimp=2.0),
+    "gimp": Scheme(2, "flip", flip=0.95, gimp=2.0),
     "f_bar": Scheme(f_bar=True),
 }
 
@@ -165,12 +167,17 @@ print(json.dumps(sorted(doubles)))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["mls", "relaxed apic", "flip"])
+@pytest.mark.parametrize("name", ["mls", "relaxed apic", "flip", "gimp"])
 def test_kernels_of_single_arguments_have_no_double(name, tmp_path):
     """But for base nodes and singular values."""
     found = run_python(COMPILED.format(name=name), NUMBA_CACHE_DIR=str(tmp_path))
     assert found == ["mpm_ref.core.spectral.svd", "mpm_ref.core.spline.base_of",
                      "mpm_ref.core.tensor.doubles"]
+
+
+def test_the_stencil_of_gimp_has_the_precision_of_the_scheme():
+    stencil = Scheme(transfer="pic", gimp=1.5, precision="single").stencil
+    assert {type(f) for f in stencil} == {np.float32}
 
 
 # what does not fit

@@ -19,7 +19,7 @@ K = 2.0 * LAW.mu + 2.0 * LAW.lam                # at rest, d = 2
 TRANSFERS = ("mls", "apic", "pic", "flip")
 
 
-def cloud(x, transfer, rpic=0.0, material=ELASTIC, relaxation=0.0):
+def cloud(x, transfer, rpic=0.0, material=ELASTIC, relaxation=0.0, gimp=0.0):
     """Particles of 0.0025 m^2 at rest at x (N, 2), and their stepper."""
     x = np.array(x, dtype=float)
     n, V = len(x), 0.25 * DX**2
@@ -27,7 +27,7 @@ def cloud(x, transfer, rpic=0.0, material=ELASTIC, relaxation=0.0):
     if relaxation:
         q = with_separate_gradient(q)
     body = Body("cloud", q, *material, np.arange(n))
-    scheme = Scheme(2, transfer, rpic=rpic, relaxation=relaxation)
+    scheme = Scheme(2, transfer, rpic=rpic, relaxation=relaxation, gimp=gimp)
     stepper = Stepper(scheme, DX, 2, np.zeros(2))
     stepper.start([body])
     return body, stepper
@@ -97,6 +97,23 @@ def test_no_cloud_grows_at_the_bound_with_relaxation(transfer, crossings):
     relaxation = crossings * DX * sqrt(RHO / (LAW.lam + 2.0 * LAW.mu))
     for x in CLOUDS.values():
         assert spectral_radius(x, transfer, 0.99, relaxation=relaxation) <= 1.0 + 1e-3
+
+
+@pytest.mark.parametrize("transfer", ["pic", "flip"])
+@pytest.mark.parametrize(("place", "S"), [(0.0, 8.0), (0.25 - 1e-7, 28.0 / 3.0)])
+def test_one_particle_of_gimp_has_the_limit_of_its_recurrence(transfer, place, S):
+    """S = 2/l on a node, and 2/l + 1/(1 - l) where its end is on the next: l = 1/4 cells."""
+    body, stepper = cloud([[(3.0 + place) * DX] * 2], transfer, gimp=2.0)
+    limit = DX * sqrt(RHO / (K * S / 2.0))
+    assert stable_dt([body], stepper).single_particle == pytest.approx(limit, rel=1e-5)
+
+
+@pytest.mark.parametrize("transfer", ["pic", "flip"])
+@pytest.mark.parametrize("gimp", [1.5, 2.0, 4.0])
+def test_no_cloud_grows_at_the_bound_with_gimp(transfer, gimp):
+    for x in CLOUDS.values():
+        assert spectral_radius(x, transfer, 0.99, gimp=gimp) <= 1.0 + 1e-3
+    assert spectral_radius(CLOUDS["one"], transfer, 1.05, gimp=gimp) > 1.01
 
 
 def test_relaxation_shortens_the_step_of_apic_alone():

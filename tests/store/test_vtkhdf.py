@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from small_runs import ENERGY, block, colliding, frame_of, state_of
 
+from mpm_ref.plain.spline import pairs
 from mpm_ref.store.results import BadResults, Results
 from mpm_ref.store.vtkhdf import export_grid, export_particles
 from mpm_ref.store.writer import StoredFields, create
@@ -103,6 +104,25 @@ def test_vtk_reads_the_grid_back(tmp_path, results, d):
         near = np.abs(points[:, None, :d] - x).max(axis=2).min(axis=1) < 1.5 * results.dx
         np.testing.assert_array_equal(density > 0.0, near)
     assert frames == 3
+
+
+@pytest.mark.parametrize("gimp", [0.0, 2.0])
+def test_the_grid_has_the_weights_of_the_scheme(tmp_path, gimp):
+    """The second moment of the mass, which differs between GIMP and quadratic splines."""
+    problem = colliding()
+    problem = replace(problem, scheme=replace(problem.scheme, transfer="pic", gimp=gimp))
+    with results_of(tmp_path / "run.h5", problem, frames=1) as results:
+        assert results.gimp == gimp
+        export_grid(results, tmp_path / "grid.vtkhdf")
+        x, m = (np.concatenate([results.field(body, *key) for body in results.bodies])
+                for key in (("x", 0), ("m",)))
+    with h5py.File(tmp_path / "grid.vtkhdf") as h5:
+        root = h5["VTKHDF"]
+        m_i = root["PointData/density"][0].astype(float).sum(axis=0) * problem.dx**2
+        nodes = root.attrs["Origin"][0] + problem.dx * np.arange(len(m_i))
+    ip = pairs(x, problem.dx, 2, gimp)
+    expected = (m[:, None] * ip.w * (problem.dx * ip.node[..., 0]) ** 2).sum()
+    assert m_i @ nodes**2 == pytest.approx(expected, rel=1e-6)      # of single precision
 
 
 def test_frames_share_the_cells(tmp_path, results, d):

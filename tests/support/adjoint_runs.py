@@ -76,7 +76,7 @@ def splash():
                Conditions(walls=walls))
 
 
-def dive(transfer="flip", degree=3, relaxation=0.0):
+def dive(transfer="flip", degree=3, relaxation=0.0, gimp=0.0):
     """2D: an elastic disk with a body force of its own meets a wall that rises and holds it."""
     body = moving(ball("jelly", (0.31, 0.14), JELLY, NoFlow(), transfer=transfer, radius=1.7),
                   (0.5, -2.0), 4.0)
@@ -87,7 +87,7 @@ def dive(transfer="flip", degree=3, relaxation=0.0):
     rising = Motion(translation=Steady((0.0, 0.5)))
     floor = Collider(half_space((0.0, 0.07), (0.3, 1.0)), "noslip", motion=rising)
     rpic = 0.2 * (transfer in AFFINE and not relaxation)
-    scheme = Scheme(degree, transfer, flip=0.95, rpic=rpic, relaxation=relaxation)
+    scheme = Scheme(degree, transfer, flip=0.95, rpic=rpic, relaxation=relaxation, gimp=gimp)
     return Run((body,), scheme, np.array((0.0, -9.8)), Conditions((floor,)))
 
 

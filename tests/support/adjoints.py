@@ -24,13 +24,17 @@ def pairing(a, b):
 
 
 def inside_cells(case, rng, n=40):
-    """Random particles, none within a tenth of a cell of where its stencil changes; a full tau is
-    not symmetric, as that of a neural law need not be (NCLAW-X5).
+    """Random particles, none within a tenth of a cell of where its stencil changes, or a twentieth
+    of where its slopes have kinks; a full tau is not symmetric, as that of a neural law need not be
+    (NCLAW-X5).
     """
     q = cloud(case, rng, n)
     q.tau[:] += rng.normal(size=q.tau.shape)
     cell = rng.integers(-3, 3, q.x.shape) + 0.5 * (case.degree - 1)
-    q.x[:] = DX * (cell + rng.uniform(0.1, 0.9, q.x.shape))
+    place = rng.uniform(0.1, 0.9, q.x.shape)
+    for kink in case.kinks:
+        place += 0.1 * (abs(place - kink) < 0.05)
+    q.x[:] = DX * (cell + place)
     return q
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.body import particles_at, with_separate_gradient
+from mpm_ref.core.gimp import gimp_stencil
 from mpm_ref.core.grid import Storage
 from mpm_ref.core.order import slabs_of
 from mpm_ref.core.spline import STENCILS
@@ -28,15 +29,21 @@ class Case(NamedTuple):
     body_force: bool = False
     fluid: bool = False
     relaxed: bool = False
+    gimp: float = 0.0
 
     @property
     def stencil(self):
-        return STENCILS[self.degree]
+        return gimp_stencil(self.gimp) if self.gimp else STENCILS[self.degree]
+
+    @property
+    def kinks(self):
+        """Where slopes have kinks in a cell of stencils, but for its ends [cells]."""
+        return (self.stencil.low - 0.5, self.stencil.high - 0.5) if self.gimp else ()
 
     @property
     def method(self):
         return Method(DX, self.degree, self.transfer, flip=SHARE,
-                      relaxation=RELAXATION * self.relaxed)
+                      relaxation=RELAXATION * self.relaxed, gimp=self.gimp)
 
     @property
     def separate(self):
@@ -50,6 +57,7 @@ class Case(NamedTuple):
     @property
     def name(self):
         marks = "-b" * self.body_force + "-fluid" * self.fluid + "-relaxed" * self.relaxed
+        marks += f"-gimp{self.gimp:g}" * (self.gimp > 0.0)
         return f"{self.transfer}{self.degree}-{self.d}d{marks}"
 
 
@@ -60,6 +68,8 @@ COVER = (
     Case("pic", 2, 3),
     Case("flip", 1, 3),
     Case("flip", 3, 2, body_force=True),
+    Case("flip", 2, 2, body_force=True, gimp=2.0),
+    Case("pic", 2, 3, gimp=1.5),
     Case("apic", 2, 2),
     Case("apic", 3, 3, body_force=True),
     Case("mls", 2, 2, fluid=True),
@@ -76,6 +86,9 @@ EVERY = tuple(
     for d in (2, 3)
     for body_force, fluid in ((False, False), (True, True))
     for relaxed in ((False, True) if transfer in AFFINE else (False,))
+) + tuple(
+    Case(transfer, 2, d, body_force=both, fluid=both, gimp=2.0)
+    for transfer in ("pic", "flip") for d in (2, 3) for both in (False, True)
 )
 
 
@@ -132,5 +145,5 @@ def over(grid, a, box):
 def plain_grid(case, q, dt, gravity):
     """The plain twin of particles, its pairs, and its nodes."""
     matter = twin(q)
-    ip = pairs(matter.x, DX, case.degree)
+    ip = pairs(matter.x, DX, case.degree, case.gimp)
     return matter, ip, particles_to_grid([matter], [ip], case.method, gravity, dt)

@@ -62,6 +62,15 @@ def test_knobs_change_what_they_name():
     assert not scene_at(averaged, setting(integrator="hot-plus")).scheme.f_bar
     with pytest.raises(SceneError, match="implicit steps average no volumes"):
         scene_at(scene, setting(integrator="hot-plus", f_bar=True))
+    smooth = scene_at(scene, setting(transfer="flip 0.95", gimp=2.0))
+    assert smooth.step_scheme.gimp == 2.0
+    assert scene_at(smooth, setting(particles=1.5)).scheme.gimp == 3.0
+    assert scene_at(smooth, setting(particles=0.25)).scheme.gimp == 1.0
+    for other in (setting(degree=2), setting(degree=1), setting(transfer="mls"), setting(gimp=0.0),
+                  setting(integrator="hot-plus")):
+        assert scene_at(smooth, other).scheme.gimp == 0.0
+    with pytest.raises(SceneError, match=r"gimp = 2.0 with transfer 'mls'"):
+        scene_at(scene, setting(gimp=2.0))
     implicit = scene_at(scene, setting(integrator="hot-plus"))
     assert (implicit.integrator, implicit.step_scheme.transfer) == ("hot-plus", "apic")
     assert scene_at(implicit, setting(eps=1e-3)).solver.eps == 1e-3

@@ -205,6 +205,25 @@ def test_averaged_volumes_are_tried_near_incompressibility():
         assert [text for text in texts if "f_bar" in text] == expected
 
 
+def test_gimp_is_tried_with_the_points_per_cell():
+    """In explicit scenes with several points per cell; affine transfers become FLIP, and splines of
+    another degree quadratic ones. Where a scene has GIMP, it is tried without.
+    """
+    three = FLIGHT.replace("velocity", 'sampling = { type = "regular", per_cell = 3 }\nvelocity')
+    one = three.replace("per_cell = 3", "per_cell = 1")
+    assert len({FLIGHT, three, one}) == 3
+    linear = 'scheme = { transfer = "pic", degree = 1 }\n' + three
+    for text, expected in (
+            (FLIGHT, ["degree 2, transfer flip 0.95, gimp 2.0"]),
+            (linear, ["degree 2, gimp 3.0"]), (one, []), ('integrator = "hot"' + FLIGHT, []),
+            ('scheme = { transfer = "pic", gimp = 2 }\n' + FLIGHT, ["gimp 0.0"])):
+        scene = loads(text)
+        settings = [one for one in single_knobs(scene) if one.get("gimp") is not None]
+        assert [one.text for one in settings] == expected
+        for chosen in settings:
+            assert scene_at(scene, chosen).scheme.gimp == chosen.get("gimp")
+
+
 def test_the_other_precision_is_tried_in_explicit_scenes():
     single, implicit = 'scheme = { precision = "single" }' + FLIGHT, 'integrator = "hot"' + FLIGHT
     for text, expected in ((FLIGHT, ["precision single"]), (single, ["precision double"]),

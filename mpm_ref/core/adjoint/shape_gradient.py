@@ -4,12 +4,13 @@
     MLS form        a_ip = D^-1 w_ip r_ip       da_ip/dx_p = D^-1 (r_ip dw_ip^T - w_ip I)
 
 Names as in `transfer`. The base node of a particle is piecewise constant and has no derivative.
-Where a weight has a kink (degree 1), or its slope has one (gradient form, degree 2), the
+Where a weight has a kink (degree 1), or its slope has one (gradient form, degree 2, GIMP), the
 derivative is that from above.
 """
 
 from typing import NamedTuple
 
+from ..gimp import Gimp, gimp_curvatures
 from ..jit import by_type, kernel
 from ..stencil import arm, gradient, locate, product, slopes_per_axis, weights_per_axis
 from ..tensor import dot, lin, mv
@@ -82,6 +83,17 @@ def around(x, grid, stencil):
 
 # second derivatives of the weights w_ip with respect to the position of the particle
 
+three_curvatures = by_type("three_curvatures")          # (f, stencil) -> N'' of three nodes
+
+
+@kernel
+def _quadratic_curvatures(f, stencil):
+    return 1.0, -2.0, 1.0
+
+
+three_curvatures.method(tuple, _quadratic_curvatures)
+three_curvatures.method(Gimp, gimp_curvatures)
+
 
 @kernel
 def curvatures(f, stencil):
@@ -89,7 +101,7 @@ def curvatures(f, stencil):
     if len(stencil) == 2:
         return 0.0, 0.0
     elif len(stencil) == 3:
-        return 1.0, -2.0, 1.0
+        return three_curvatures(f, stencil)
     else:
         return 2.0 - f, 3.0 * f - 5.0, 4.0 - 3.0 * f, f - 1.0
 

@@ -45,8 +45,8 @@ class FullModel(NamedTuple):
 
 def ldm_full_model(scene):
     """Return the `FullModel` of a scene that LDM reduces. Raises ValueError for features that its
-    reduced runs do not have: more bodies, plastic flow, an affine transfer, averaged volumes,
-    conditions at surfaces, a velocity at the start, forces of single particles, a box.
+    reduced runs do not have: more bodies, plastic flow, an affine transfer, averaged volumes or
+    splines, conditions at surfaces, a velocity at the start, forces of single particles, a box.
     """
     problem = build(scene)
     body = problem.bodies[0]
@@ -54,6 +54,7 @@ def ldm_full_model(scene):
                    "plastic flow": not isinstance(body.flow, NoFlow),
                    f"the transfer {problem.scheme.transfer}": problem.scheme.transfer != "pic",
                    "averaged volumes (f_bar)": problem.scheme.f_bar,
+                   "averaged splines (gimp)": problem.scheme.gimp > 0.0,
                    'boundary = "surface"': isinstance(problem.conditions, SurfaceConditions),
                    "a start that moves": np.any(body.particles.v),
                    "forces of single particles": body.particles.b.ndim > 1,

@@ -12,6 +12,7 @@ from mpm_ref.rom.study.errors import Squares
 from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.run import SCHEMES, RunOptions, ldm_run
 from mpm_ref.scene import build
+from mpm_ref.scene.records import Scheme
 from validation.common.scenes import catalogue_scene, with_
 from validation.ldm.references import nearest_state_errors, run_errors
 from validation.ldm.studies import GRAVITY, PHI, POKE, POKES, STUDIES, TORSION, poked_again
@@ -132,9 +133,10 @@ def test_a_region_that_was_let_go_asks_for_no_samples():
 @pytest.mark.parametrize(("scene", "said"), [
     (with_(GRAVITY.scene(1.0), scheme=with_(GRAVITY.scene(1.0).scheme, transfer="apic")), "apic"),
     (with_(GRAVITY.scene(1.0), scheme=with_(GRAVITY.scene(1.0).scheme, f_bar=True)), "averaged"),
+    (with_(GRAVITY.scene(1.0), scheme=Scheme(transfer="pic", gimp=2.0)), r"\(gimp\)"),
     (catalogue_scene("nsf_metal"), "plastic flow"),
     (catalogue_scene("colliding_disks"), "more than one body"),
-], ids=["transfer", "volumes", "plastic", "bodies"])
+], ids=["transfer", "volumes", "splines", "plastic", "bodies"])
 def test_what_a_reduced_run_does_not_know_is_refused(scene, said):
     with pytest.raises(ValueError, match=said):
         ldm_full_model(scene)
