@@ -28,6 +28,7 @@ SCHEMES = {
     "flip-cubic-2d": (Scheme(3, "flip", flip=0.9), 2), "pic-2d": (Scheme(transfer="pic"), 2),
     "apic-relaxed-2d": (Scheme(transfer="apic", relaxation=2e-3), 2),
     "mls-single-3d": (Scheme(precision="single"), 3),
+    "flip-gimp-2d": (Scheme(transfer="flip", flip=0.95, gimp=2.0), 2),
     "mls-f-bar-2d": (Scheme(f_bar=True), 2),
     "apic-f-bar-3d": (Scheme(transfer="apic", f_bar=True), 3),
 }
