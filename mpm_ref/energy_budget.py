@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .core.grid import Storage, update
+from .core.grid import update
 from .core.jit import total
 from .core.stencil import inverse_inertia
 from .energy import Energy, elastic, energy
@@ -90,7 +90,7 @@ class BudgetStepper(Stepper):
     def __init__(self, budget, scheme, dx, dim, gravity, conditions=None):
         super().__init__(scheme, dx, dim, gravity, conditions)
         self.budget = budget
-        self.momenta = Storage(dx, scheme.stencil, dim, flip=scheme.keeps_old_velocity)
+        self.momenta = self.new_storage()
         self.inertia = 1.0 / inverse_inertia(dx, scheme.stencil) if scheme.affine else 0.0
 
     def start(self, bodies):

@@ -20,6 +20,7 @@ from .core.grid import Storage, update
 from .core.law import returned
 from .core.order import by_cell, slabs_of
 from .core.precision import PRECISIONS, converted
+from .core.sparse_grid import SparseStorage
 from .core.spline import STENCILS
 from .core.transfer import g2p, p2g, rpic
 from .materials import NoFlow
@@ -146,7 +147,8 @@ class Stepper:
     """Advances bodies by explicit steps, reusing grid storage.
 
     conditions is any object with `apply(grid, t, dt)`, which changes the nodal velocities (see
-    `core.boundary`).
+    `core.boundary`). Its grids may be sparse if it has a `read_distance`, the number of cells from
+    a node with mass to the nodes that it reads for this one; else they are dense.
     """
 
     implicit = False     # whether dt is free of the bounds of waves
@@ -160,8 +162,13 @@ class Stepper:
             raise ValueError(f"gravity = {gravity}: expected {dim} finite numbers, in m/s^2")
         if not 0.0 < dx < np.inf:
             raise ValueError(f"dx = {dx}: expected a positive, finite length in m")
-        self.storage = Storage(dx, scheme.stencil, dim, flip=scheme.keeps_old_velocity)
-        self.cells = Storage(dx, NODES, dim)
+        self.storage, self.cells = self.new_storage(), SparseStorage(dx, NODES, dim)
+
+    def new_storage(self):
+        """Return storage for grids of a step, dense ones where conditions may not be sparse."""
+        distance = 0 if self.conditions is None else getattr(self.conditions, "read_distance", None)
+        size = self.dx, self.scheme.stencil, len(self.gravity), self.scheme.keeps_old_velocity
+        return Storage(*size) if distance is None else SparseStorage(*size, gap=distance)
 
     def start(self, bodies):
         """Check that the bodies fit the scheme, and compute their stress; needed once, before the

@@ -18,6 +18,7 @@ import numpy as np
 from .contact import NOSLIP, PRESCRIBED, SEPARATE, SLIP, STICKY, Contacts, meet
 from .jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .levelset import distances, normals
+from .mass_nodes import in_order_of_space, nodes_beyond, nodes_with_mass, place, selected
 from .motion import STILL, Motion
 from .tensor import lin, mat, mv, put_vec, vec, vm
 
@@ -84,7 +85,7 @@ class Prescribed:
         """The nodes it contains at time t; see `touch`."""
         d = nodes.m.ndim
         if not self.since < t - EVEN * dt <= self.until:
-            nodes = nodes._replace(flat=nodes.flat[:0])
+            nodes = selected(nodes, slice(0))
         pose = self.motion.pose(t, dt, d)
         region = pose if self.follows else self.motion.at_rest.pose(t, dt, d)
         return touch(nodes, self.shape, self.inside, region, pose)
@@ -142,6 +143,8 @@ class Conditions:
     colliders: tuple = ()
     prescribed: tuple = ()
     walls: BoxWalls | None = None
+
+    read_distance = 0       # cells from a node with mass to the nodes that are read for it
 
     @property
     def parts(self):
@@ -202,27 +205,12 @@ def _check(kind, friction):
 
 # the nodes of each part, and one velocity for each that satisfies all parts
 
-class MassNodes(NamedTuple):
-    """Some nodes of a grid, by their index in its flattened arrays."""
-
-    flat: np.ndarray      # (A,)
-    m: np.ndarray         # (n1, .., nd)  for its shape
-    origin: np.ndarray    # (d,)          index of the first node, counted from the world's origin
-    dx: float             # [m]
-
-
 class Touch(NamedTuple):
     """The nodes that one part contains."""
 
     node: np.ndarray      # (K,)    index in the grid's flattened arrays
     n: np.ndarray         # (K, d)  outward normal of the part
     v: np.ndarray         # (K, d)  velocity of the part there [m/s]
-
-
-def nodes_with_mass(grid):
-    """`MassNodes` of a grid that have mass."""
-    flat = np.flatnonzero(grid.m.reshape(-1) > 0.0)
-    return MassNodes(flat, grid.m, grid.origin, float(grid.dx))
 
 
 def touch(nodes, shape, inside, region, pose):
@@ -243,8 +231,10 @@ def nodes_within(nodes, shape, inside, poses, margin):
     side = -1.0 if inside else 1.0
     away = side * distances(X, shape)
     near = np.flatnonzero(away <= margin * nodes.dx)
+    if nodes.origin.ndim > 1:
+        near = near[in_order_of_space(nodes.origin[near])]
     n, v = side * normals(X[near], shape), np.empty((len(near), d))
-    nodes = nodes._replace(flat=nodes.flat[near])
+    nodes = selected(nodes, near)
     carry(nodes, region, pose, n, v, (0, len(n)))
     return Touch(nodes.flat, n, v), away[near] / nodes.dx
 
@@ -254,20 +244,10 @@ def touch_wall(grid, axis, limit, below):
 
     Nodes are counted in integers. A limit of None is no wall.
     """
-    shape, first = grid.m.shape, int(grid.origin[axis])
-    start, stop = 0, shape[axis]
-    if limit is None:
-        stop = 0
-    elif below:
-        stop = min(max(limit - first, 0), stop)
-    else:
-        start = min(max(limit + 1 - first, 0), stop)
-    slab = np.moveaxis(grid.m, axis, 0)[start:stop]
-    i, *others = np.nonzero(slab > 0.0)
-    others.insert(axis, i + start)
-    n = np.zeros((len(i), len(shape)))
+    node = nodes_beyond(grid, axis, limit, below)
+    n = np.zeros((len(node), grid.m.ndim))
     n[:, axis] = 1.0 if below else -1.0
-    return Touch(np.ravel_multi_index(others, shape), n, np.zeros_like(n))
+    return Touch(node, n, np.zeros_like(n))
 
 
 def solve(touches, kind, mu, grid):
@@ -301,17 +281,6 @@ def by_node(touches, kind, mu):
     first = np.flatnonzero(node[1:] != node[:-1]) + 1
     start = np.concatenate(([0], first, [len(node)]))
     return Contacts(node, part[sort], n, v, np.zeros_like(v), kind, mu), start
-
-
-@kernel
-def place(nodes, k, n):
-    """Position of the k-th of the nodes, of a grid of shape n [m]."""
-    i, o, dx = nodes.flat[k], nodes.origin, nodes.dx
-    if len(n) == 2:
-        return (o[0] + i // n[1]) * dx, (o[1] + i % n[1]) * dx
-    else:
-        j = i // n[2]
-        return (o[0] + j // n[1]) * dx, (o[1] + j % n[1]) * dx, (o[2] + i % n[2]) * dx
 
 
 @kernel

@@ -1,9 +1,12 @@
-"""Grid storage that covers the matter and moves with it, and the momentum update of its nodes.
+"""Dense grid storage that covers the matter and moves with it, and the momentum update of nodes.
 
 The grid is the smallest box of nodes that the particles reach, aligned to whole slabs along the
-first axis. A domain
-box is a boundary condition (see `boundary`), not an array bound.
+first axis; `sparse_grid` has that of bodies far from each other. A domain box is a boundary
+condition (see `boundary`), not an array bound.
 """
+
+from math import prod
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +17,7 @@ from .spline import base_of
 from .state import NONE, Grid
 
 MAX_BYTES = 8e9
+FARTHEST = 2.0**50      # cells from the world's origin to a particle
 
 
 class OutOfRange(ValueError):
@@ -51,6 +55,14 @@ def extent(x):
     return low.min(axis=0), high.max(axis=0)
 
 
+class GridBox(NamedTuple):
+    """A box of nodes."""
+
+    first: np.ndarray       # (d,)  index of its first node, from the world's origin
+    shape: tuple            # nodes along each axis
+    real: type              # of the floats of its grid
+
+
 class Storage:
     """Reusable storage of a `Grid` for spacing dx [m] and a stencil; see `cover`. The grid has the
     precision of the points that it covers.
@@ -64,47 +76,67 @@ class Storage:
     def cover(self, clouds):
         """Zeroed grid over all nodes that the points of `clouds`, arrays (N, d), reach.
 
-        Raises OutOfRange where a point is not finite or the box would need more than MAX_BYTES.
+        Raises OutOfRange where a point is not finite or too far away, or the box of nodes would
+        need more than MAX_BYTES.
         """
-        low, high = self._box(clouds)
-        real = low.dtype.type
+        return self.zeroed(self.box(clouds))
+
+    def box(self, clouds):
+        """Return the `GridBox` of the points of `clouds`. Raises OutOfRange as `cover` does, but
+        for its size.
+        """
+        extents = [extent(x) for x in clouds]
+        low = np.min([e[0] for e in extents], axis=0)
+        high = np.max([e[1] for e in extents], axis=0)
+        if max(-low.min(), high.max()) / self.dx > FARTHEST:
+            raise OutOfRange(
+                f"particles from {low} to {high}: expected coordinates of at most {FARTHEST:.0e} "
+                f"times dx = {self.dx}, beyond which places in a cell are lost to round-off; has a "
+                "particle flown off?"
+            )
         first = self._base(low)
         first[0] -= first[0] % (2 * slab_width(self.stencil))     # see `order`
-        shape = tuple(int(k) for k in self._base(high) + len(self.stencil) - first)
-        size = int(np.prod(np.array(shape, dtype=float)))
+        shape = tuple(map(int, self._base(high) + len(self.stencil) - first))
+        return GridBox(first, shape, low.dtype.type)
+
+    def bytes(self, shape, box):
+        """Return the memory [bytes] of arrays of a shape, for the matter in a `GridBox`."""
+        return np.dtype(box.real).itemsize * prod(shape) * (1 + self.vectors * self.dim)
+
+    def zeroed(self, box):
+        """Return the zeroed dense grid of a `GridBox`. Raises OutOfRange as `fields`."""
+        return Grid(*self.fields(box.shape, box), box.first, self.dx)
+
+    def fields(self, shape, box):
+        """Return zeroed arrays m, v, f, v_old of a shape, for the matter in a `GridBox`. Raises
+        OutOfRange where they would need more than MAX_BYTES.
+        """
+        size = prod(shape)
+        if self.bytes(shape, box) > MAX_BYTES:
+            low, high = box.first * self.dx, (box.first + box.shape - 1) * self.dx
+            raise OutOfRange(
+                f"nodes from {low} to {high} need a grid of {self.bytes(shape, box):.1e} bytes at "
+                f"dx = {self.dx}, at most {MAX_BYTES:.0e} are allowed; has a particle flown off, "
+                "or is dx too small?"
+            )
         needed = size * (1 + self.vectors * self.dim)
-        if len(self._buffer) < needed or self._buffer.dtype != real:
-            self._buffer = np.empty(int(1.3 * needed), real)
+        if len(self._buffer) < needed or self._buffer.dtype != box.real:
+            self._buffer = np.empty(int(1.3 * needed), box.real)
         self._buffer[:needed] = 0.0
-        return self._carve(shape, size, first)
+        return self._carve(shape, size)
 
     def _base(self, x):
         dx = converted(self.dx, x.dtype.type)
         return np.array([base_of(x_a, dx, self.stencil) for x_a in x], dtype=np.int64)
 
-    def _box(self, clouds):
-        boxes = [extent(x) for x in clouds]
-        low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
-        nodes = np.prod((high - low) / self.dx + len(self.stencil))
-        size = low.itemsize * nodes * (1 + self.vectors * self.dim)
-        if size > MAX_BYTES or max(-low.min(), high.max()) / self.dx > 2.0**50:
-            raise OutOfRange(
-                f"particles from {low} to {high} need a grid of {size:.1e} bytes at "
-                f"dx = {self.dx}, at most {MAX_BYTES:.0e} are allowed; has a particle flown off, "
-                "or is dx too small?"
-            )
-        return low, high
-
-    def _carve(self, shape, size, first):
-        d, at, real = self.dim, size, self._buffer.dtype.type
-        fields = []
+    def _carve(self, shape, size):
+        d, at, none = self.dim, size, converted(NONE, self._buffer.dtype.type)
+        vectors = []
         for _ in range(self.vectors):
-            fields.append(self._buffer[at : at + size * d].reshape((*shape, d)))
+            vectors.append(self._buffer[at : at + size * d].reshape((*shape, d)))
             at += size * d
-        none = converted(NONE, real)
-        v, f, v_old = fields if self.vectors == 3 else (fields[0], none, none)
-        m = self._buffer[:size].reshape(shape)
-        return Grid(m, v, f, v_old, first, self.dx)
+        v, f, v_old = vectors if self.vectors == 3 else (vectors[0], none, none)
+        return self._buffer[:size].reshape(shape), v, f, v_old
 
 
 @kernel

@@ -44,27 +44,32 @@ def slab_axis(shape, width):
 
 
 class Cut(NamedTuple):
-    """The nodes of an axis that is cut into slabs."""
+    """The nodes of an axis of a dense grid that is cut into slabs."""
 
     first: int          # number of the grid's first node along it
     dx: float           # [m]
 
 
 @kernel
-def _slab_of(x_p, cut, stencil):
-    return (base_of(x_p, cut.dx, stencil) - cut.first) // slab_width(stencil)
+def slab_of(x, p, cut, stencil):
+    """Slab of particle p: x is (N,) along the axis of a `Cut`, or (N, d) on a sparse grid, cut."""
+    if x.ndim == 1:
+        return (base_of(x[p], cut.dx, stencil) - cut.first) // slab_width(stencil)
+    else:
+        base, _ = locate(vec(x, p, cut.m.shape), cut, stencil)
+        return base[cut.axis] // slab_width(stencil)
 
 
 @kernel
 def _count(x, cut, stencil, count, bounds):
     for p in range(bounds[0], bounds[1]):
-        count[_slab_of(x[p], cut, stencil)] += 1
+        count[slab_of(x, p, cut, stencil)] += 1
 
 
 @kernel
 def _place(x, cut, stencil, at, order, bounds):
     for p in range(bounds[0], bounds[1]):
-        a = _slab_of(x[p], cut, stencil)
+        a = slab_of(x, p, cut, stencil)
         order[at[a]] = p
         at[a] += 1
 
@@ -82,12 +87,16 @@ def _place_all(x, cut, stencil, at, order):
 
 
 def slabs_of(x, grid, stencil):
-    """Stable counting sort of the particles at x (N, d) by slab. All must lie inside the grid."""
+    """Stable counting sort of the particles at x (N, d) by slab. All must lie inside the grid, a
+    `Grid` or a `SparseGrid`.
+    """
     width = slab_width(stencil)
-    axis = slab_axis(grid.m.shape, width)
+    if grid.origin.ndim == 1:
+        axis = slab_axis(grid.m.shape, width)
+        along, cut = x[:, axis], Cut(grid.origin[axis], converted(grid.dx, x.dtype.type))
+    else:
+        axis, along, cut = grid.axis, x, with_rounded_spacing(grid)
     n_slabs = -(-grid.m.shape[axis] // width)
-    along = x[:, axis]
-    cut = Cut(grid.origin[axis], converted(grid.dx, x.dtype.type))
     count = np.zeros((CHUNKS, n_slabs), dtype=np.int64)
     _count_all(along, cut, stencil, count)
     ends = np.cumsum(count.T.ravel()).reshape(n_slabs, CHUNKS)     # by slab, then by chunk
@@ -107,8 +116,16 @@ def _cells(x, grid, stencil, cell):
         cell[p] = key
 
 
+def base_coordinates(x, dx, stencil):
+    """Return the base nodes (N, d) of points x, counted from the world's origin, as floats."""
+    return np.floor(x / dx - 0.5 * (len(stencil) - 2))
+
+
 def by_cell(x, grid, stencil):
     """Stable permutation that sorts the particles at x (N, d) by cell, first axis slowest."""
-    cell, grid = np.empty(len(x), dtype=np.int64), with_rounded_spacing(grid)
+    grid = with_rounded_spacing(grid)
+    if grid.origin.ndim > 1:
+        return np.lexsort(base_coordinates(x, grid.dx, stencil).T[::-1])
+    cell = np.empty(len(x), dtype=np.int64)
     _cells(x, grid, stencil, cell)      # serial: the sort below takes far longer
     return np.argsort(cell, kind="stable")

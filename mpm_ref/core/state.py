@@ -50,6 +50,26 @@ class Grid(NamedTuple):
     dx: float           #                  spacing [m]
 
 
+class SparseGrid(NamedTuple):
+    """Boxes of nodes, far from each other in space, side by side in the arrays of one grid; n boxes
+    (see `sparse_grid`). Kernels read it as they read a `Grid`.
+
+    `m` to `v_old` and `dx` are those of a `Grid`; nodes between the boxes have no mass.
+    """
+
+    m: np.ndarray
+    v: np.ndarray
+    f: np.ndarray
+    v_old: np.ndarray
+    origin: np.ndarray  # (rows, 2 d)  hash table of blocks of nodes (see `block_table`), and what
+    #                                  takes the index of a node to its index in the arrays
+    dx: float
+    first: np.ndarray   # (n, d)       index of the first node of each box, from the world's origin
+    place: np.ndarray   # (n, d)       index of this node in the arrays
+    size: np.ndarray    # (n, d)       nodes of each box along each axis
+    axis: int           #              across which slabs are cut (see `order`)
+
+
 NONE = np.empty(0)                # a field that is not carried
 NO_HISTORY = np.empty((0, 0))     # the same for y, which has one axis when it is carried
 

@@ -6,6 +6,7 @@ of the stencil has offset k on all axes but the last (k is padded by 0 to d entr
 last.
 """
 
+from .block_table import block_of, row_of
 from .jit import kernel
 from .spline import base_of, slopes, weights
 from .tensor import number
@@ -13,24 +14,53 @@ from .tensor import number
 
 @kernel
 def locate(x, grid, stencil):
-    """Base node of the point x, counted from the grid's first, and its offset s = x/dx - base
+    """Base node of the point x, as an index in the grid's arrays, and its offset s = x/dx - base
     [cells].
     """
     dx, o = grid.dx, grid.origin
     if len(x) == 2:
         i, j = base_of(x[0], dx, stencil), base_of(x[1], dx, stencil)
         s = offset(x[0] / dx, i), offset(x[1] / dx, j)
-        return (i - o[0], j - o[1]), s
+        return in_arrays((i, j), o), s
     else:
         i, j, k = base_of(x[0], dx, stencil), base_of(x[1], dx, stencil), base_of(x[2], dx, stencil)
         s = offset(x[0] / dx, i), offset(x[1] / dx, j), offset(x[2] / dx, k)
-        return (i - o[0], j - o[1], k - o[2]), s
+        return in_arrays((i, j, k), o), s
 
 
 @kernel
 def offset(xi, i):
     """Return xi - i of a coordinate xi and the number i of a node [cells]."""
     return xi - number(i, xi)
+
+
+@kernel
+def in_arrays(i, origin):
+    """Index in a grid's arrays of the base node i, counted from the world's origin; origin is that
+    of a `Grid` or of a `SparseGrid` (see `state`).
+    """
+    if origin.ndim == 1:
+        return minus_origin(i, origin)
+    else:
+        return plus_shift(i, origin, row_of(origin, block_of(i)))
+
+
+@kernel
+def minus_origin(i, origin):
+    """The index i from a grid's first node on."""
+    if len(i) == 2:
+        return i[0] - origin[0], i[1] - origin[1]
+    else:
+        return i[0] - origin[0], i[1] - origin[1], i[2] - origin[2]
+
+
+@kernel
+def plus_shift(i, table, row):
+    """The index i with the shift of a block, which follows it in its row of a table."""
+    if len(i) == 2:
+        return i[0] + table[row, 2], i[1] + table[row, 3]
+    else:
+        return i[0] + table[row, 3], i[1] + table[row, 4], i[2] + table[row, 5]
 
 
 @kernel

@@ -40,6 +40,7 @@ from .tensor import dot, fill, lin, norm, put_vec, vec
 NEAR = 0.75         # cells in front of a surface, up to which nodes carry its condition
 EDGE = 1e-6         # cells: nodes this near to NEAR do not, so that D - d >= 1 for those that do
 DEEP = 2.0          # cells behind a surface, out of reach of matter in front of it
+FARTHEST = 5        # cells along an axis from a node behind a surface to those that interpolate
 LIGHT = 1e-2        # of the heaviest node of a plane: a node below it does not count
 LIGHTEST = 1e-200   # [kg] least mass of a node, so that its inverse is finite
 SWEEPS = 300        # at most
@@ -75,6 +76,8 @@ class SurfaceConditions(Conditions):
 
     Prescribed regions and walls counted in nodes act on nodes, as in `Conditions`.
     """
+
+    read_distance = FARTHEST
 
     def apply(self, grid, t, dt):
         """Change the velocities of an updated grid; see `Conditions.apply`."""
@@ -152,12 +155,17 @@ def satisfy(points, rules, prescribed, grid):
     kind = by_approach(every, kind, v)
     J = np.zeros((len(kind), d))
     rules = Rules(share, kind, mu.astype(float))
-    nodes = np.unique(every.node[every.a != 0.0])
+    nodes = first_appearances(every.node[every.a != 0.0])
     most = largest_energy(grid.m.reshape(-1)[nodes], v[nodes], every.v)
     solved = solve_impulses(every, rules, J, v, tuple(range(d)))
     solved &= not kinetic(grid.m.reshape(-1)[nodes], v[nodes]) > most
     sums = [part.sum(axis=0) for part in np.split(J, np.cumsum(sizes)[:-1])]
     return np.array(sums), solved
+
+
+def first_appearances(nodes):
+    """Return nodes (K,) in the order in which they appear, each once."""
+    return nodes[np.sort(np.unique(nodes, return_index=True)[1])]
 
 
 def largest_energy(m, v, v_w):
@@ -199,12 +207,13 @@ def steepest(n):
 
 
 @kernel
-def reference(x, d, n):
+def reference(d, n):
     """Return the distance D and the point x_r on the first plane of nodes at D >= NEAR [cells], on
-    the normal n through the node x, which lies at the distance d; and the axis of that plane.
+    the normal n through a node, which lies at the distance d; and the axis of that plane. The point
+    is counted from the node, so that round-off does not depend on where the grid begins.
     """
     axis = steepest(n)
-    foot = lin(1.0, x, -d, n)
+    foot = lin(-d, n, 0.0, n)
     start = foot[axis] + NEAR * n[axis]
     nearest = round(start)
     if abs(start - nearest) > 1e-9:
@@ -242,24 +251,26 @@ def with_entry(k, b, value):
 
 
 @kernel
-def flat_index(k, shape):
-    """Return the index of node k in the flattened arrays of a grid, -1 outside of it."""
-    i = 0
+def flat_index(i, k, shape):
+    """Return the index in the flattened arrays of a grid of the node k from node i on, -1 outside
+    of the grid.
+    """
+    j = 0
     for b in range(len(shape)):
-        if not 0 <= k[b] < shape[b]:
+        if not 0 <= i[b] + k[b] < shape[b]:
             return -1
-        i = i * shape[b] + k[b]
-    return i
+        j = j * shape[b] + i[b] + k[b]
+    return j
 
 
 @kernel
-def position_of(i, shape):
-    """Return the indices of a node, as floats, from that in the flattened arrays."""
+def indices_of(i, shape):
+    """Return the indices of a node from that in the flattened arrays."""
     if len(shape) == 2:
-        return float(i // shape[1]), float(i % shape[1])
+        return i // shape[1], i % shape[1]
     else:
         j = i // shape[2]
-        return float(j // shape[1]), float(j % shape[1]), float(i % shape[2])
+        return j // shape[1], j % shape[1], i % shape[2]
 
 
 @kernel
@@ -273,12 +284,12 @@ def attach(points, d, m, bounds):
     """
     shape, masses = m.shape, m.reshape(-1)
     for j in range(bounds[0], bounds[1]):
-        x = position_of(points.node[j, 0], shape)
-        D, r, axis = reference(x, d[j], vec(points.n, j, shape))
+        first = indices_of(points.node[j, 0], shape)
+        D, r, axis = reference(d[j], vec(points.n, j, shape))
         total, heaviest = 0.0, 0.0
         for c in range(points.a.shape[1] - 1):
             k, w = corner(r, c, axis)
-            i = flat_index(k, shape)
+            i = flat_index(first, k, shape)
             if i >= 0 and w > 0.0 and masses[i] > 0.0:
                 points.node[j, 1 + c], points.a[j, 1 + c] = i, w
                 heaviest = max(heaviest, masses[i])

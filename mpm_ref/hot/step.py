@@ -61,6 +61,11 @@ class ImplicitStepper(Stepper):
                 raise ValueError(f"body {body.name!r} has body forces b of its own: expected "
                                  "gravity alone with an implicit integrator")
 
+    def new_storage(self):
+        """Return storage for dense grids, whose nodes the solvers number."""
+        return Storage(self.dx, self.scheme.stencil, len(self.gravity),
+                       self.scheme.keeps_old_velocity)
+
     def advance_grid(self, bodies, t, dt):
         """Return the grid of the step from time t [s] by dt [s], which holds m and the new v. The
         bodies stay as they are. Raises ValueError unless dt > 0.

@@ -139,13 +139,16 @@ def fly(transfer, what, count):
 
 
 FAR = (0, 1, 4, 8, 12)              # powers of ten, in cells from the origin
+COMPANY = 6             # power of ten, in cells from a block to another one
 TOO_FAR = 17            # power of ten at which a cell is smaller than the gap between two doubles
 
 
 @experiment("extremes.explicit.far_from_origin", title="The same run far from the origin",
             profiles=("quick", "standard"), budget={"quick": 4, "standard": 20})
 def far_from_origin(run):
-    """Compare a shaken block shifted by 10^k cells with the one at the origin."""
+    """Compare a shaken block shifted by 10^k cells with the one at the origin, and this one with
+    itself where another block is far away.
+    """
     count = run.choose(quick=200, standard=2000)
     near, rows = final_velocities(0.0, count), []
     for k in FAR[1:]:
@@ -157,6 +160,12 @@ def far_from_origin(run):
                    note="RMS change of the velocities over their RMS. A position is rounded to "
                         "eps 10^k cells; calibrated: 2.5 to 200 times that")
     run.table("error", ("cells", "error", "rounding"), rows)
+    both = final_velocities(0.0, count, shifted_block(10.0**COMPANY)._replace(name="company"))
+    run.record("extremes.explicit.far_from_origin.company", rms(both - near) / rms(near),
+               comparator="<=", bound=0.0, scale=f"4 x 4 cells, {count} steps",
+               note="RMS change of the velocities of the block at the origin over their RMS, where "
+                    f"another one is 10^{COMPANY} cells away along both axes: none, as the grid of "
+                    "each has its own nodes and sums")
     body = shifted_block(10.0**TOO_FAR)
     end = outcome(problem(body, DX, fixed_clock(10, 1e-3)))
     run.record("extremes.explicit.far_from_origin.beyond", int(end.kind in (*STOPS, OUT_OF_RANGE)),
@@ -176,11 +185,13 @@ def shifted_block(cells):
     return body
 
 
-def final_velocities(cells, count):
-    """Return the velocities (N, d) of the block after some steps, in the order of sampling."""
+def final_velocities(cells, count, *others):
+    """Return the velocities (N, d) of the block after some steps, in the order of sampling; other
+    bodies are stepped with it.
+    """
     body = shifted_block(cells)
     dt = 0.5 * step_limits(shifted_block(0.0), DX).dt
-    end = outcome(problem(body, DX, fixed_clock(count, dt)))
+    end = outcome(problem((body, *others), DX, fixed_clock(count, dt)))
     if end.kind != FINISHED:
         return np.full_like(body.particles.v, np.nan)
     return body.particles.v[np.argsort(body.id)]
