@@ -9,6 +9,8 @@ tried again if dt is past its stable bound, or if the particles were too fast fo
 it is made as it is, and the monitor ends the run.
 """
 
+import numpy as np
+
 from .body import keep_inside
 from .core.displacement import largest_speed, speed_bound
 from .monitor import check, lost, runs_away
@@ -51,7 +53,8 @@ def fault_of(problem, stepper, state, grid, dt):
     solve = stepper.report
     if solve is not None and not (solve.converged or problem.allow_unstable):
         return f"the implicit step was not solved: {solve.message}"
-    limit = (1.0 - SLACK) * problem.limits.cfl * problem.dx / dt
+    slack = max(SLACK, float(np.finfo(problem.scheme.real).eps))
+    limit = (1.0 - slack) * problem.limits.cfl * problem.dx / dt
     parts, scheme = stepper.parts(grid, state.bodies), stepper.scheme
     if all(speed_bound(*part) <= limit for part in parts):
         return None

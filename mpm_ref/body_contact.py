@@ -72,6 +72,9 @@ def rules_of(contacts, names):
 def check_contacts(contacts, names, scheme):
     """Raise ValueError for contacts that do not fit the names of bodies, or the scheme."""
     rules_of(contacts, names)
+    if contacts and scheme.precision != "double":
+        raise ValueError(f"contact of bodies with precision = {scheme.precision!r}: expected "
+                         "'double', which the gap of the bodies needs")
     if contacts and scheme.degree == 1:
         raise ValueError("contact of bodies with degree = 1: expected 2 or 3, whose weights have a "
                          "continuous slope, from which the normal is taken")

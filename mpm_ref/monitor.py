@@ -76,8 +76,16 @@ def account(problem, bodies):
         return None
     mass = sum(float(b.particles.m.sum()) for b in bodies)
     noise = 1e-6 * mass * float(np.linalg.norm(problem.gravity)) * problem.dx
+    if problem.scheme.precision == "single":
+        noise += sum(rounding_of_heights(b.particles, problem.gravity) for b in bodies)
     noise += sum(REST**2 * stiffness(b.law) * float(b.particles.V0.sum()) for b in bodies)
     return Account(energy(bodies, problem.gravity, problem.inertia), noise + 1e-300)
+
+
+def rounding_of_heights(particles, gravity):
+    """Return the sum of the rounding errors of m g . x, at most one of each particle [J]."""
+    q, eps = particles, float(np.finfo(particles.x.dtype).eps)
+    return eps * float(np.abs(q.m[:, None] * q.x * gravity).sum())
 
 
 def runs_away(problem, state, dt):

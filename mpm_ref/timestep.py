@@ -27,6 +27,7 @@ import numpy as np
 
 from .core.jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from .core.law import kirchhoff_hat
+from .core.precision import with_rounded_spacing
 from .core.spectral import svd
 from .core.stencil import (
     column,
@@ -211,6 +212,7 @@ def stable_dt(bodies, stepper):
         grid = scatter(bodies, stepper.storage, scheme, 0.0)
     else:
         grid = stepper.storage.cover([body.particles.x for body in bodies])
+    grid = with_rounded_spacing(grid)
     bounds = [_body_dt(body, grid, scheme, stepper.gravity) for body in bodies]
     return TimeStep(*map(float, np.min(bounds, axis=0)))
 

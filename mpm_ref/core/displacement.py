@@ -11,6 +11,7 @@ from math import inf, isfinite, sqrt
 import numpy as np
 
 from .jit import CHUNKS, chunk, kernel, parallel, prange
+from .precision import with_rounded_spacing
 from .relaxation import blend
 from .stencil import column, columns, locate, node, of_node, product, weights_per_axis
 from .tensor import dot, fill, lin, vec
@@ -47,7 +48,7 @@ def _largest_square_all(particles, grid, stencil, flip, out):
 
 def largest_speed(particles, grid, stencil, flip=0.0):
     """Return the largest speed [m/s] with which grid velocities move or leave a particle."""
-    out = np.empty(CHUNKS)
+    out, grid = np.empty(CHUNKS), with_rounded_spacing(grid)
     _largest_square_all(particles, grid, stencil, float(flip), out)
     return sqrt(out.max())
 

@@ -17,7 +17,7 @@ from .spline import base_of
 from .state import NONE, Grid
 
 MAX_BYTES = 8e9
-FARTHEST = 2.0**50      # cells from the world's origin to a particle
+FINEST = 0.25           # of a cell: coordinates of particles are at least that exact
 
 
 class OutOfRange(ValueError):
@@ -88,9 +88,10 @@ class Storage:
         extents = [extent(x) for x in clouds]
         low = np.min([e[0] for e in extents], axis=0)
         high = np.max([e[1] for e in extents], axis=0)
-        if max(-low.min(), high.max()) / self.dx > FARTHEST:
+        farthest = FINEST / np.finfo(low.dtype).eps
+        if max(-low.min(), high.max()) / self.dx > farthest:
             raise OutOfRange(
-                f"particles from {low} to {high}: expected coordinates of at most {FARTHEST:.0e} "
+                f"particles from {low} to {high}: expected coordinates of at most {farthest:.0e} "
                 f"times dx = {self.dx}, beyond which places in a cell are lost to round-off; has a "
                 "particle flown off?"
             )

@@ -6,9 +6,9 @@ node: `stencil.locate` adds what a table has for this block. Each box is aligned
 box of nodes around all particles, and the slabs of the grid are cut across the axis of that box, so
 that sums at a node have the same order, hence the same bits, as on a dense grid (see `order`).
 
-A grid is dense unless that would be wasteful: with at least LEAST nodes, at least PER_PARTICLE for
-each particle, and more than 1/SHARE times as many as the boxes of islands. Only where the first two
-hold are islands looked for.
+A grid is dense unless that would be wasteful: with more than LEAST nodes, more than PER_PARTICLE
+for each particle, and more than 1/SHARE times as many as the arrays of the sparse grid have, boxes
+and gaps. Only where the first two hold are islands looked for. Past MAX_BYTES it is always sparse.
 """
 
 from math import prod

@@ -146,7 +146,8 @@ def satisfy(points, rules, prescribed, grid):
     if not sum(sizes):
         return np.zeros((len(sizes), d)), True
     every = SurfacePoints(*(np.concatenate(column) for column in zip(*points, strict=True)))
-    v = grid.v.reshape(-1, d)
+    stored = grid.v.reshape(-1, d)
+    v = stored.astype(float, copy=False)
     fixed = np.isin(every.node, prescribed)
     detach(every, (fixed & (every.a != 0.0)).any(axis=1))
     m = np.maximum(grid.m.reshape(-1)[every.node], LIGHTEST, dtype=float)
@@ -158,6 +159,8 @@ def satisfy(points, rules, prescribed, grid):
     nodes = first_appearances(every.node[every.a != 0.0])
     most = largest_energy(grid.m.reshape(-1)[nodes], v[nodes], every.v)
     solved = solve_impulses(every, rules, J, v, tuple(range(d)))
+    if v.dtype != stored.dtype:
+        stored[nodes] = v[nodes]
     solved &= not kinetic(grid.m.reshape(-1)[nodes], v[nodes]) > most
     sums = [part.sum(axis=0) for part in np.split(J, np.cumsum(sizes)[:-1])]
     return np.array(sums), solved

@@ -69,10 +69,11 @@ def make_world(problem):
     features than those of NCLAW-sim.
     """
     walls, clip, scheme = getattr(problem.conditions, "walls", None), problem.clip, problem.scheme
-    plain = scheme.one_gradient and not scheme.f_bar
+    plain = scheme.one_gradient and not scheme.f_bar and scheme.precision == "double"
     if problem.dim != 3 or not plain or (scheme.degree, scheme.rpic) != (2, 0.0):
         raise ValueError(f"{problem.title!r}: expected MLS-MPM with quadratic splines in 3D, "
-                         "without damping, relaxation or averaged volumes (f_bar)")
+                         "in double precision, without damping, relaxation or averaged volumes "
+                         "(f_bar)")
     if len(problem.bodies) != 1 or problem.clock.dt is None:
         raise ValueError(f"{problem.title!r}: expected one body and a fixed dt")
     if clip is None or not is_nclaw_box(walls) or problem.conditions.parts:

@@ -139,8 +139,8 @@ def scheme_removals(scene):
 
 def can_be_single(scene):
     """Return whether a scene is of double precision and could be of single."""
-    return scene.integrator == "explicit" and scene.scheme.precision == "double" and not any(
-        body.material.is_neural for body in scene.body)
+    return scene.integrator == "explicit" and scene.scheme.precision == "double" and not (
+        scene.contact or any(body.material.is_neural for body in scene.body))
 
 
 def to_single(tables):

@@ -6,6 +6,7 @@ from .. import explicit
 from ..body import keep_inside
 from ..core import boundary
 from ..core.contact import PRESCRIBED
+from ..core.grid import Storage
 from ..core.jit import kernel
 from ..core.state import growth
 from ..core.stencil import column, columns, locate, product, weights_per_axis
@@ -24,8 +25,9 @@ def step(problem, bodies, stepper, t, dt):
     plain twin, see `node_contacts`.
     """
     scheme, arrays = problem.scheme, {}
-    scatter_stages(bodies, stepper.storage, scheme, arrays)
-    grid = explicit.scatter(bodies, stepper.storage, scheme, dt)
+    storage = Storage(problem.dx, scheme.stencil, problem.dim, flip=scheme.keeps_old_velocity)
+    scatter_stages(bodies, storage, scheme, arrays)
+    grid = explicit.scatter(bodies, storage, scheme, dt)
     explicit.update(grid, stepper.gravity, dt, scheme.mass_eps, scheme.gravity_on_empty)
     full = grid.m > 0.0
     arrays["velocity"] = grid.v[full]

@@ -263,7 +263,7 @@ def nodes_around(problem):
     """Return the bytes of a grid (mass, velocity) over the box of all particles."""
     x = np.concatenate([body.particles.x for body in problem.bodies])
     cells = np.ceil((x.max(axis=0) - x.min(axis=0)) / problem.dx) + problem.scheme.degree + 1
-    return int(np.prod(cells)) * 8 * (1 + problem.dim)
+    return int(np.prod(cells)) * x.itemsize * (1 + problem.dim)
 
 
 def bytes_of(bodies):

@@ -71,8 +71,8 @@ def volume_settings(scene):
 
 
 def precision_settings(scene):
-    """Return the setting with the other precision, for scenes without a learned law."""
-    if any(body.material.is_neural for body in scene.body):
+    """Return the setting with the other precision, for scenes without a learned law or contact."""
+    if scene.contact or any(body.material.is_neural for body in scene.body):
         return []
     other = "double" if scene.scheme.precision == "single" else "single"
     return [setting(precision=other)]

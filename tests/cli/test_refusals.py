@@ -16,7 +16,7 @@ shape = { type = "sphere", center = [1e5, 1e5], radius = 0.1 }
 sampling = { type = "regular", per_cell = 2 }
 material = { law = "fixed_corotated", E = 1e5, nu = 0.3 }
 """
-FAR = SCENE + SECOND
+FAR = 'integrator = "hot"\n' + SCENE + SECOND       # its grid is dense
 TOO_LARGE = SCENE.replace("dt = 0.001", "dt = 0.1")
 STATE = SCENE.replace('shape = { type = "sphere", center = [0.5, 0.3], radius = 0.1 }',
                       'particles = { file = "state.npz" }').replace(
@@ -68,6 +68,11 @@ def test_a_scene_that_cannot_begin_changes_nothing(scene, tmp_path, earlier, opt
 def test_a_state_that_can_begin_does(scene, tmp_path):
     scene.write_text(STATE)
     write_state(tmp_path / "state.npz", 1.01)
+    assert mpm_ref("run", scene, "--out", tmp_path / "run.h5", "--steps", 1).exit_code == 0
+
+
+def test_bodies_far_apart_run_explicitly(scene, tmp_path):
+    scene.write_text(SCENE + SECOND)
     assert mpm_ref("run", scene, "--out", tmp_path / "run.h5", "--steps", 1).exit_code == 0
 
 

@@ -9,7 +9,9 @@ from threads import by_threads
 
 from mpm_ref.adjoint import StepAdjoint
 from mpm_ref.body import in_precision
+from mpm_ref.body_contact import BodyContact, check_contacts
 from mpm_ref.core.boundary import Collider, Conditions
+from mpm_ref.core.grid import OutOfRange
 from mpm_ref.core.solids import half_space
 from mpm_ref.core.surface import SurfaceConditions
 from mpm_ref.energy import angular_momentum, momentum
@@ -17,6 +19,7 @@ from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.materials import NoFlow, make_flow
 from mpm_ref.problem import Clock, Problem
+from mpm_ref.timestep import stable_dt
 
 EPS = float(np.finfo(np.float32).eps)
 STEPS = 20
@@ -180,6 +183,37 @@ def test_the_stencil_of_gimp_has_the_precision_of_the_scheme():
 
 
 # what does not fit
+
+def test_far_from_the_origin_single_precision_is_refused():
+    """Beyond 2^21 cells, where a coordinate is no more exact than a quarter of one."""
+    for cells, far in ((2.0**20, False), (2.0**22, True)):
+        problem = two_disks(Scheme(), conditions=Conditions())
+        for body in problem.bodies:
+            body.particles.x[:] += cells * DX
+        stepped(problem, 1)
+        if far:
+            with pytest.raises(OutOfRange, match="at most 2e\\+06 times dx"):
+                stepped(single(problem), 1)
+        else:
+            stepped(single(problem), 1)
+
+
+def test_contact_of_bodies_refuses_single_precision():
+    with pytest.raises(ValueError, match="'single': expected 'double', which the gap"):
+        check_contacts((BodyContact(("a", "b")),), ["a", "b"], Scheme(precision="single"))
+
+
+def test_single_particle_bounds_are_those_of_double():
+    """Also with linear splines, whose bound reads the masses of nodes."""
+    for scheme in (Scheme(1, "flip"), Scheme(2, "apic")):
+        problem = two_disks(scheme)
+        bounds = []
+        for one in (problem, single(problem)):
+            stepper = Stepper(one.scheme, DX, 2, one.gravity)
+            stepper.start(one.bodies)
+            bounds.append(stable_dt(one.bodies, stepper))
+        assert bounds[1] == pytest.approx(bounds[0], rel=1e-4)
+
 
 def test_arrays_of_the_other_precision_are_refused():
     problem = two_disks(Scheme(precision="single"))

@@ -54,6 +54,7 @@ def ldm_full_model(scene):
                    "plastic flow": not isinstance(body.flow, NoFlow),
                    f"the transfer {problem.scheme.transfer}": problem.scheme.transfer != "pic",
                    "averaged volumes (f_bar)": problem.scheme.f_bar,
+                   "single precision": problem.scheme.precision != "double",
                    "averaged splines (gimp)": problem.scheme.gimp > 0.0,
                    'boundary = "surface"': isinstance(problem.conditions, SurfaceConditions),
                    "a start that moves": np.any(body.particles.v),
@@ -83,6 +84,7 @@ def nsf_full_model(scene):
         *((getattr(problem.scheme, key) > 0.0, f"scheme.{key}", f"scheme.{key} = 0")
           for key in ("rpic", "relaxation", "mass_eps")),
         (problem.scheme.f_bar, "averaged volumes", "scheme.f_bar = false"),
+        (problem.scheme.precision != "double", "single precision", "double"),
         (isinstance(problem.conditions, SurfaceConditions), 'boundary = "surface"',
          'boundary = "nodes"'),
         (bool(problem.contacts), "contact of bodies", "one velocity field"),
