@@ -47,10 +47,21 @@ def particles_at(x, v, m, V0, transfer="mls", fluid=False):
 
 
 def in_precision(particles, real):
-    """Return particles with arrays of the float type `real`; L stays the array of C where it is."""
-    shared = particles.L is particles.C
-    particles = converted(particles, real)
-    return particles._replace(L=particles.C) if shared else particles
+    """Return particles with arrays of the float type `real`; L stays the array of C where it is.
+
+    Raises ValueError where a mass or a volume becomes zero, or a number infinite.
+    """
+    with np.errstate(over="ignore"):
+        rounded = converted(particles, real)
+    for name, a in rounded._asdict().items():
+        exact = getattr(particles, name)
+        lost = np.isinf(a) & np.isfinite(exact)
+        if name in ("m", "V0"):
+            lost |= (a == 0.0) & (exact != 0.0)
+        if lost.any():
+            raise ValueError(f"the number {exact[lost][0]:.3g} in the array {name} is outside of "
+                             f"the range of {np.dtype(real)}: expected precision = \"double\"")
+    return rounded._replace(L=rounded.C) if particles.L is particles.C else rounded
 
 
 def with_separate_gradient(particles):

@@ -102,7 +102,8 @@ def build_body(scene, k, material, arrays=None):
         particles = _sampled(scene, record, material, (path, [scene.seed, k]))
     else:
         particles = _particles_of(scene, record, material, (path, arrays))
-    particles = in_precision(particles, scene.step_scheme.real)
+    with errors_at(path):
+        particles = in_precision(particles, scene.step_scheme.real)
     return Body(record.name, particles, *material, np.arange(len(particles.x)))
 
 

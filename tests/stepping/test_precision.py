@@ -1,5 +1,6 @@
 """Steps in single precision: near those in double, of half the memory, with the same invariants."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -196,6 +197,14 @@ def test_far_from_the_origin_single_precision_is_refused():
                 stepped(single(problem), 1)
         else:
             stepped(single(problem), 1)
+
+
+@pytest.mark.parametrize(("name", "value"), [("m", 1e-50), ("V0", 1e-46), ("v", 1e39)])
+def test_numbers_out_of_the_range_of_single_precision_are_refused(name, value):
+    particles = two_disks().bodies[0].particles
+    getattr(particles, name)[3] = value
+    with pytest.raises(ValueError, match=re.escape(f"number {value:.3g} in the array {name} ")):
+        in_precision(particles, np.float32)
 
 
 def test_contact_of_bodies_refuses_single_precision():
