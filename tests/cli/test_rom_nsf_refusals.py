@@ -69,6 +69,7 @@ def test_a_study_with_a_fault_is_refused_in_a_sentence(tmp_path, edit, words):
 @pytest.mark.parametrize(("before", "after", "words"), [
     ('transfer = "apic"', 'transfer = "pic"', "has the transfer pic"),
     ('transfer = "apic"', 'transfer = "apic", f_bar = true', "has averaged volumes"),
+    ('transfer = "apic"', 'transfer = "apic", precision = "single"', "has single precision"),
     ('transfer = "apic"', 'transfer = "apic", relaxation = 0.01', "has scheme.relaxation"),
     ('transfer = "apic"', 'transfer = "apic", rpic = 0.1', "has scheme.rpic"),
     ('transfer = "apic"', 'transfer = "apic", mass_eps = 0.1', "has scheme.mass_eps"),

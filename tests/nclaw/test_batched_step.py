@@ -283,6 +283,7 @@ def test_a_world_is_that_of_the_problem(before):
 @pytest.mark.parametrize("change", [
     {"scheme": Scheme(transfer="apic")}, {"scheme": Scheme(degree=3)}, {"scheme": Scheme(rpic=0.1)},
     {"scheme": Scheme(relaxation=1e-3)}, {"scheme": Scheme(f_bar=True)},
+    {"scheme": Scheme(precision="single")},
     {"bodies": 2}, {"clock": Clock(steps=1)}, {"clip": None}, {"conditions": None},
     {"conditions": Conditions()}, {"conditions": Conditions(walls=replace(WALLS, kind="noslip"))},
     {"conditions": Conditions(walls=replace(WALLS, friction=0.3))},

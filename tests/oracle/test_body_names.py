@@ -44,6 +44,12 @@ def test_averaged_volumes_are_refused(tmp_path):
         oracle.record(problem, tmp_path / "golden.h5", 1)
 
 
+def test_single_precision_is_refused(tmp_path):
+    problem = replace(stretched(), scheme=Scheme(precision="single"))
+    with pytest.raises(ValueError, match="'single': golden files hold arrays of double precision"):
+        oracle.record(problem, tmp_path / "golden.h5", 1)
+
+
 def test_gimp_is_refused(tmp_path):
     problem = replace(stretched(), scheme=Scheme(transfer="pic", gimp=2.0))
     with pytest.raises(ValueError, match=r"gimp = 2.0: golden files have weights of splines"):

@@ -58,6 +58,15 @@ def test_admissible_laws_are_a_material_with_an_energy(scene):
         assert len(results) == 1 + STEPS // 5
 
 
+def test_learned_laws_are_refused_in_single_precision(scene):
+    saved(scene.parent, admissible_toys.laws())
+    text = scene.read_text().replace("scheme = {", 'scheme = { precision = "single",')
+    assert "precision" in text
+    scene.write_text(text)
+    with pytest.raises(SceneError, match=r'precision = "single": the learned law of body'):
+        load_scene(scene)
+
+
 def test_admissible_laws_are_refused_in_2d(scene):
     saved(scene.parent, admissible_toys.laws())
     flat = scene.parent / "flat.toml"

@@ -5,21 +5,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import types
 from problems import DT, DX, JELLY, METAL, ball, digest, moving, run_python, stepped, two_disks
 from threads import by_threads
 
 from mpm_ref.adjoint import StepAdjoint
-from mpm_ref.body import in_precision
+from mpm_ref.body import Body, in_precision, particles_at
 from mpm_ref.body_contact import BodyContact, check_contacts
 from mpm_ref.core.boundary import Collider, Conditions
 from mpm_ref.core.grid import OutOfRange
+from mpm_ref.core.jit import kernel
 from mpm_ref.core.solids import half_space
 from mpm_ref.core.surface import SurfaceConditions
 from mpm_ref.energy import angular_momentum, momentum
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.materials import NoFlow, make_flow
+from mpm_ref.monitor import account
 from mpm_ref.problem import Clock, Problem
+from mpm_ref.simulate import simulate
+from mpm_ref.store.checkpoint import digest as digest_of_state
+from mpm_ref.store.running import Options, run
 from mpm_ref.timestep import stable_dt
 
 EPS = float(np.finfo(np.float32).eps)
@@ -89,11 +95,29 @@ def copied(bodies):
 @pytest.mark.parametrize("name", SCHEMES)
 def test_steps_in_single_are_near_those_in_double(name):
     """Within 100 roundings a step: sums over a stencil have up to 16 terms in 2D, x is 8 dx wide.
-    Not within one: the arithmetic is single, not the storage alone.
+    Not within one, as steps in double would be.
     """
     off = differences(two_disks(SCHEMES[name]))
     assert max(off.values()) < 100 * STEPS * EPS
     assert min(off.values()) > EPS
+
+
+TENTH = 0.1
+
+
+@kernel
+def shifted(x):
+    return TENTH * x[0] + (0.5, x[1])[0]
+
+
+def test_constants_have_the_precision_of_the_arguments():
+    """Literals, constants and items of tuples; where one argument is double, all is double."""
+    one, other = np.float32(3.0), np.float32(4.0)
+    for x, real in (((one, other), types.float32), ((3.0, 4.0), types.float64),
+                    ((one, 4.0), types.float64)):
+        shifted(x)
+        assert shifted._entry.nopython_signatures[-1].return_type == real
+    assert shifted((one, other)) == np.float32(TENTH) * one + np.float32(0.5)
 
 
 MATERIALS = {
@@ -148,6 +172,29 @@ def test_one_and_two_threads_give_the_same_bits():
         return digest(stepped(single(two_disks()), STEPS, sort_every=8))
     here = run()
     assert by_threads(run) == [here, here]
+
+
+def test_a_resumed_run_has_the_bits_of_the_run(tmp_path):
+    def problem():
+        return replace(single(two_disks()), clock=Clock(dt=DT, steps=60, every=20))
+    *_, last = simulate(problem())
+    for steps in (17, None):
+        end = run(problem(), tmp_path / "run.h5", Options(steps=steps, resume=True))
+    assert digest_of_state(end.state) == digest_of_state(last.state)
+    assert all(a.dtype != np.float64 for body in end.state.bodies for a in body.particles)
+
+
+def test_at_rest_far_away_rounded_heights_are_no_gain_of_energy():
+    """m g . x is rounded to single, by more than what the run's account otherwise allows."""
+    problem = single(two_disks(gravity=(0.0, -9.8)))
+    for body in problem.bodies:
+        body.particles.x[:, 1] += 2.0**16 * DX
+        body.particles.v[:] = 0.0
+    problem = replace(problem, conditions=Conditions())
+    double = replace(problem, scheme=Scheme())
+    heights = sum(float((b.particles.m * 9.8 * b.particles.x[:, 1]).sum()) for b in problem.bodies)
+    noise = [account(one, problem.bodies).noise for one in (problem, double)]
+    assert noise[0] - noise[1] == pytest.approx(EPS * heights, rel=1e-3)
 
 
 COMPILED = """
@@ -222,6 +269,23 @@ def test_single_particle_bounds_are_those_of_double():
             stepper.start(one.bodies)
             bounds.append(stable_dt(one.bodies, stepper))
         assert bounds[1] == pytest.approx(bounds[0], rel=1e-4)
+
+
+def test_single_particle_bounds_read_the_nodes_of_the_rounded_spacing():
+    """A particle at a node of dx in single, and just before that of dx in double. Linear splines: S
+    is (1/w_0 + 1/w_1)/dx^2 = 4/dx^2 between two nodes that the particle has to itself.
+    """
+    dx, scheme = np.float32(DX), Scheme(1, "pic", precision="single")
+    x = next(x for k in range(8, 4000)
+             if (x := np.float32(k * DX)) / dx >= k > float(x) / DX)
+    q = particles_at(np.array([[x, 5.5 * DX]]), np.zeros((1, 2)), np.ones(1), np.ones(1), "pic")
+    body = Body("one", in_precision(q, np.float32), JELLY, NoFlow(), np.arange(1))
+    stepper = Stepper(scheme, DX, 2, np.zeros(2))
+    stepper.start([body])
+    S = 4.0 / DX**2
+    K = 2.0 * JELLY.mu + 2.0 * JELLY.lam
+    bound = stable_dt([body], stepper).single_particle
+    assert bound == pytest.approx((2.0 / (K * S))**0.5, rel=1e-3)
 
 
 def test_arrays_of_the_other_precision_are_refused():

@@ -8,6 +8,7 @@ from far_bodies import FAST, advanced, dense, far_bodies, sparse
 from problems import DT, DX, ball, digest, moving
 from threads import by_threads
 
+from mpm_ref import oracle
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed
 from mpm_ref.core.levelset import half_space, sphere
 from mpm_ref.core.motion import Motion, Steady
@@ -103,6 +104,16 @@ def test_a_resumed_run_has_the_bits_of_the_run(tmp_path, clock):
         for steps in (37, 91, None):
             end = run(problem(), tmp_path / "run.h5", Options(steps=steps, resume=True))
     assert digest_of_state(end.state) == expected
+
+
+def test_golden_files_have_a_dense_grid(tmp_path):
+    """Also where the run of the scene has a sparse one."""
+    for name, grids in (("sparse", sparse), ("dense", dense)):
+        with grids():
+            oracle.record(far_bodies(), tmp_path / f"{name}.h5", 2)
+    report = oracle.check(tmp_path / "dense.h5", tmp_path / "sparse.h5")
+    assert report.agrees
+    assert report.compared > 20
 
 
 def test_energy_budget_is_that_of_a_dense_grid():
