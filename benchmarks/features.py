@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mpm_ref.adjoint import StepAdjoint, zero_bars, zero_sums
 from mpm_ref.body import Body, in_precision, particles_at, with_separate_gradient
+from mpm_ref.body_contact import BodyContact, ContactStepper
 from mpm_ref.core.boundary import Collider, Conditions, nclaw_walls
 from mpm_ref.core.jit import set_threads
 from mpm_ref.core.levelset import half_space
@@ -24,14 +26,16 @@ METAL = {"law": "hencky", "flow": "von_mises_hardening", "tau_y": 1e9, "xi": 0.1
 
 
 class Variant(NamedTuple):
-    """A variant of the steps of the block: scheme, material, boundary conditions, energies."""
+    """A variant of the steps of the block: scheme, material, boundary conditions, and what a round
+    does: "step", "energies" after each, "budget" of energies, "adjoint" of a step, or steps of two
+    halves with "contact", or that are "glued" because they share one velocity field.
+    """
 
     name: str
     scheme: Scheme = Scheme()
     material: dict = ELASTIC
     conditions: str = "none"
-    monitor: bool = False
-    budget: bool = False
+    work: str = "step"
 
 
 VARIANTS = (
@@ -55,8 +59,14 @@ VARIANTS = (
     Variant("walls of a box", conditions="walls"),
     Variant("floor with friction", conditions="floor"),
     Variant("floor with friction, at its surface", conditions="surface"),
-    Variant("energies every step", monitor=True),
-    Variant("energy budget", budget=True),
+    Variant("energies every step", work="energies"),
+    Variant("energy budget", work="budget"),
+    Variant("two bodies without contact", work="glued"),
+    Variant("two bodies in contact with friction", work="contact"),
+    Variant("adjoint of MLS", work="adjoint"),
+    Variant("adjoint of APIC", Scheme(transfer="apic"), work="adjoint"),
+    Variant("adjoint of Hencky", material={"law": "hencky"}, work="adjoint"),
+    Variant("adjoint of Hencky with Drucker-Prager", material=SAND, work="adjoint"),
 )
 
 
@@ -65,36 +75,61 @@ class Run:
 
     def __init__(self, variant, block):
         self.variant, self.dt = variant, block.dt
-        self.bodies = (make_body(variant, block),)
+        self.bodies = make_bodies(variant, block)
         self.gravity = (0.0, 0.0, GRAVITY)
-        conditions = make_conditions(variant.conditions, block)
-        setup = variant.scheme, block.dx, 3, self.gravity, conditions
-        self.stepper = BudgetStepper(EnergyBudget(), *setup) if variant.budget else Stepper(*setup)
+        self.stepper = make_stepper(variant, block.dx, self.gravity,
+                                    make_conditions(variant.conditions, block))
         self.stepper.start(self.bodies)
         self.stepper.sort(self.bodies)
+        if variant.work == "adjoint":
+            self.adjoint = StepAdjoint(self.stepper)
+            self.bars = [zero_bars(body) for body in self.bodies]
+            for bar in self.bars:
+                bar.x[:], bar.v[:] = 1.0, block.dt
+            self.sums = [zero_sums(body) for body in self.bodies]
 
     def step(self):
-        """Advance the block by one step."""
+        """Advance the block by one step, or carry the bars back through one from the same state."""
+        if self.variant.work == "adjoint":
+            self.adjoint.pull_back(self.bodies, self.bars, self.sums, 0.0, self.dt)
+            return
         self.stepper.step(self.bodies, 0.0, self.dt)
-        if self.variant.monitor:
+        if self.variant.work == "energies":
             energy(self.bodies, self.gravity)
 
     @property
     def bytes_per_particle(self):
         """Return the bytes of the state per particle; shared arrays count once."""
-        arrays = {id(a): a.nbytes for a in self.bodies[0].particles}
-        return sum(arrays.values()) / len(self.bodies[0].id)
+        arrays = {id(a): a.nbytes for body in self.bodies for a in body.particles}
+        return sum(arrays.values()) / sum(len(body.id) for body in self.bodies)
 
 
-def make_body(variant, block):
-    """Return the block's particles with the material of a variant."""
+def make_stepper(variant, dx, gravity, conditions):
+    """Return the stepper of a variant."""
+    if variant.work == "contact":
+        contact = BodyContact(("lower", "upper"), friction=0.3)
+        return ContactStepper([contact], variant.scheme, dx, gravity, conditions)
+    setup = variant.scheme, dx, len(gravity), gravity, conditions
+    return BudgetStepper(EnergyBudget(), *setup) if variant.work == "budget" else Stepper(*setup)
+
+
+def make_bodies(variant, block):
+    """Return the block's particles as one body, or as its two halves."""
+    if variant.work not in ("contact", "glued"):
+        return (make_body(variant, block, "block", block.x[:, 2] < np.inf),)
+    lower = block.x[:, 2] < 0.5
+    return make_body(variant, block, "lower", lower), make_body(variant, block, "upper", ~lower)
+
+
+def make_body(variant, block, name, part):
+    """Return the particles of a part (N,) of the block with the material of a variant."""
     parameters = dict(variant.material)
     law_name, flow_name = parameters.pop("law"), parameters.pop("flow", "none")
     law = make_law(law_name, E=E, nu=NU)
     material = Material(law, make_flow(flow_name, law, 3, **parameters))
-    count = len(block.x)
+    count = int(part.sum())
     particles = particles_at(
-        block.x.copy(), block.v.copy(), np.full(count, RHO * block.V0), np.full(count, block.V0),
+        block.x[part], block.v[part], np.full(count, RHO * block.V0), np.full(count, block.V0),
         variant.scheme.transfer, fluid=not material.needs_F,
     )
     if variant.scheme.relaxation:
@@ -102,7 +137,7 @@ def make_body(variant, block):
     if material.has_history:
         particles = particles._replace(y=np.full(count, material.initial_y))
     particles = in_precision(particles, variant.scheme.real)
-    return Body("block", particles, law, material.flow, np.arange(count))
+    return Body(name, particles, law, material.flow, np.arange(count))
 
 
 def make_conditions(name, block):

@@ -152,6 +152,11 @@ class Conditions:
         return *self.colliders, *self.prescribed
 
     @property
+    def rules(self):
+        """Colliders, prescribed regions and walls."""
+        return self.parts if self.walls is None else (*self.parts, self.walls)
+
+    @property
     def moves(self):
         """True if a part moves, and so may do work."""
         return any(part.motion.moves for part in self.parts)

@@ -2,18 +2,20 @@
 
 The degree is the length of `stencil` minus one: (0, 1), (0, 1, 2), (0, 1, 2, 3) are the offsets
 of the nodes that a point reaches from its base node, per axis. A stencil `Gimp` reaches the nodes
-of degree 2, with other weights.
+of degree 2, with other weights; `MlsQuadratic` and `MlsCubic` have other slopes.
 """
 
 from math import floor
 
 from .gimp import Gimp, gimp_slopes, gimp_weights
 from .jit import by_type, kernel
+from .mls_slopes import MlsCubic, MlsQuadratic, mls_slope
 
 STENCILS = {1: (0, 1), 2: (0, 1, 2), 3: (0, 1, 2, 3)}
 
 three_weights = by_type("three_weights")        # (f, stencil) -> weights of three nodes
 three_slopes = by_type("three_slopes")          # (f, stencil) -> slopes of three nodes
+four_slopes = by_type("four_slopes")            # (f, stencil) -> slopes of four nodes
 
 
 @kernel
@@ -28,9 +30,50 @@ def quadratic_slopes(f, stencil):
     return f - 1.5, 2.0 - 2.0 * f, f - 0.5
 
 
+@kernel
+def cubic_weights(f):
+    """Weights of the cubic B-splines; see `weights`."""
+    return (
+        (2.0 - f) ** 3 / 6.0,
+        2.0 / 3.0 - (f - 1.0) ** 2 * (1.5 - 0.5 * f),
+        2.0 / 3.0 - (2.0 - f) ** 2 * (0.5 * f),
+        (f - 1.0) ** 3 / 6.0,
+    )
+
+
+@kernel
+def cubic_slopes(f, stencil):
+    """Slopes of the cubic B-splines; see `slopes`."""
+    return (
+        -0.5 * (2.0 - f) ** 2,
+        (f - 1.0) * (1.5 * f - 3.5),
+        (2.0 - f) * (1.5 * f - 1.0),
+        0.5 * (f - 1.0) ** 2,
+    )
+
+
+@kernel
+def mls_quadratic_slopes(f, stencil):
+    """`mls_slope` of three nodes."""
+    a, b, c = quadratic_weights(f, stencil)
+    return mls_slope(a, 0, f, stencil), mls_slope(b, 1, f, stencil), mls_slope(c, 2, f, stencil)
+
+
+@kernel
+def mls_cubic_slopes(f, stencil):
+    """`mls_slope` of four nodes."""
+    a, b, c, d = cubic_weights(f)
+    return (mls_slope(a, 0, f, stencil), mls_slope(b, 1, f, stencil),
+            mls_slope(c, 2, f, stencil), mls_slope(d, 3, f, stencil))
+
+
 three_weights.method(tuple, quadratic_weights)
 three_weights.method(Gimp, gimp_weights)
+three_weights.method(MlsQuadratic, quadratic_weights)
 three_slopes.method(tuple, quadratic_slopes)
+three_slopes.method(MlsQuadratic, mls_quadratic_slopes)
+four_slopes.method(tuple, cubic_slopes)
+four_slopes.method(MlsCubic, mls_cubic_slopes)
 three_slopes.method(Gimp, gimp_slopes)
 
 
@@ -50,12 +93,7 @@ def weights(f, stencil):
     elif len(stencil) == 3:
         return three_weights(f, stencil)
     else:
-        return (
-            (2.0 - f) ** 3 / 6.0,
-            2.0 / 3.0 - (f - 1.0) ** 2 * (1.5 - 0.5 * f),
-            2.0 / 3.0 - (2.0 - f) ** 2 * (0.5 * f),
-            (f - 1.0) ** 3 / 6.0,
-        )
+        return cubic_weights(f)
 
 
 @kernel
@@ -66,9 +104,4 @@ def slopes(f, stencil):
     elif len(stencil) == 3:
         return three_slopes(f, stencil)
     else:
-        return (
-            -0.5 * (2.0 - f) ** 2,
-            (f - 1.0) * (1.5 * f - 3.5),
-            (2.0 - f) * (1.5 * f - 1.0),
-            0.5 * (f - 1.0) ** 2,
-        )
+        return four_slopes(f, stencil)

@@ -129,7 +129,7 @@ class Splitting:
         """
         q = self.potential
         modes = tuple(isotropic_modes(s, q.dt * q.dt * k) for s, k in zip(q.points, self.k))
-        H = assembled(tuple(zip(q.points, modes)), q.unknowns, q.pattern)
+        H = assembled(tuple(zip(q.points, modes)), q.unknowns, q.pattern, q.stencil)
         n = len(q.unknowns.m)
         return sp.csr_array((H.data[:, 0, 0].copy(), H.indices, H.indptr), shape=(n, n))
 

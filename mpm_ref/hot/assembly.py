@@ -44,11 +44,10 @@ class CellBlocks(NamedTuple):
     T: np.ndarray     # (d, S, d, d)    sum_c C_(.b)(.c) dw_Jp,c at [b, J]
 
 
-def assembled(bodies, unknowns, pattern):
+def assembled(bodies, unknowns, pattern, stencil):
     """H = M + the blocks of bodies, pairs of points and `StressModes`, as a bsr_array [kg]."""
     n, d = unknowns.v.shape
     matrix = _empty(unknowns.number, pattern)
-    stencil = tuple(range(pattern.degree + 1))
     for points, modes in bodies:
         for color in (0, 1):
             _assemble_color(points, modes, stencil, unknowns.dx, matrix, color)
@@ -233,6 +232,11 @@ class Pattern(NamedTuple):
     indices: np.ndarray    # (blocks,)       column of each block, ascending in a row
     block: np.ndarray      # (n, offsets)    block of a row and an offset; -1 where there is none
     degree: int
+
+    @property
+    def diagonal(self):
+        """The block (n,) of each row that is on the diagonal."""
+        return self.block[:, self.block.shape[1] // 2]
 
 
 def pattern_of(number, degree):

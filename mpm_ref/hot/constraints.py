@@ -4,7 +4,7 @@ A collider that fixes a node takes all its freedom; one with a plane n . (u - v_
 direction. "separate" is an inequality, which an active set decides: a plane becomes active if the
 node would go through it, and is released if it would have to pull the node. Near rest a node may
 ask for both in turn without end, since solves are inexact: a plane that has been released twice
-stays active for the rest of the step. Friction does not derive from a potential and is refused.
+stays active for the rest of the step. The loads of active planes give their friction (`friction`).
 """
 
 import numpy as np
@@ -24,6 +24,7 @@ from ..core.contact import (
 )
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..core.tensor import dot, fill, identity, lin, mlin, norm, outer, put_mat, put_vec, vec
+from .friction import Friction
 
 FREE, PLANE, FIXED = range(3)     # roles of a pair of node and part
 RELEASES = 2                      # of a plane in a step, at most
@@ -31,16 +32,11 @@ SLACK = 1e-9                      # of the largest speed or impulse at any node:
 
 
 class ActiveSet:
-    """The conditions at the nodes of one step, of length dt and ending at time t [s].
-
-    Raises ValueError for a part with friction.
-    """
+    """The conditions at the nodes of one step, of length dt and ending at time t [s]."""
 
     def __init__(self, conditions, grid, unknowns, t, dt):
         touches, kind, mu = conditions.touched(grid, t, dt)
-        if any(mu):
-            raise ValueError(f"friction = {max(mu)} with an implicit integrator: expected 0, since "
-                             'friction has no potential; take integrator = "explicit"')
+        self.rubs = any(mu)
         self.like = tuple(range(grid.m.ndim))
         self.role = np.zeros(sum(len(touch.node) for touch in touches), dtype=np.int8)
         self.releases = np.zeros_like(self.role)        # of each pair so far
@@ -76,6 +72,20 @@ class ActiveSet:
         _update_roles_all(self.contacts, self.start, (self.role, self.releases), (u, g), slack,
                           self.like)
         return int(np.count_nonzero(self.role != before))
+
+
+    def friction(self, unknowns, impulse, eps):
+        """Return the `Friction` of active planes, or None where none rubs.
+
+        impulse (n, d) [kg m/s] is that of the parts on the nodes, eps [m/s] the speed of creep.
+        """
+        if not (self.rubs and len(self.role)):
+            return None
+        w, c = np.zeros(len(self.start) - 1), np.zeros((len(self.start) - 1, len(self.like)))
+        _fill_friction_all(self.contacts, self.start, self.role, impulse, (w, c), self.like)
+        k = np.flatnonzero(w > 0.0)
+        node = self.contacts.node[self.start[k]]
+        return Friction(node, w[k], c[k], unknowns.B[node], eps) if len(k) else None
 
 
 @kernel
@@ -158,6 +168,33 @@ def update_roles(contacts, pairs, state, u, g, slack):
             elif (k in planes and releases[k] < RELEASES
                   and load(contacts, k, planes, g) < -slack[1]):
                 role[k], releases[k] = FREE, releases[k] + 1
+
+
+@kernel
+def fill_friction(contacts, pairs, role, impulse):
+    """w and c of `Friction` at one node, which gets an impulse from its planes."""
+    w, c = 0.0, fill(0.0, impulse)
+    count, _ = fixed_velocity(contacts, pairs, role, impulse)
+    if count == 0:
+        _, _, planes = plane_velocity(contacts, pairs, role, impulse)
+        for k in planes:
+            if k >= 0:
+                l = load(contacts, k, planes, impulse)
+                l = abs(l) if contacts.kind[contacts.part[k]] == SLIP else max(l, 0.0)
+                mu_l = contacts.mu[contacts.part[k]] * l
+                w, c = w + mu_l, lin(1.0, c, mu_l, vec(contacts.v, k, impulse))
+    return w, lin(1.0 / w if w > 0.0 else 0.0, c, 0.0, c)
+
+
+@parallel
+def _fill_friction_all(contacts, start, role, impulse, out, like):
+    for c in prange(CHUNKS):
+        first, last = chunk(c, len(start) - 1)
+        for a in range(first, last):
+            J = vec(impulse, contacts.node[start[a]], like)
+            w, v = fill_friction(contacts, (start[a], start[a + 1]), role, J)
+            out[0][a] = w
+            put_vec(out[1], a, v)
 
 
 @parallel

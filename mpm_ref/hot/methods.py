@@ -61,6 +61,7 @@ class SolverOptions:
                                         # within the tolerance alone (see `rigid`)
     window: int = 8                     # pairs of L-BFGS
     rebuild_every: int = 0              # steps after which L-BFGS takes a new Hessian; 0: never
+    creep: float = 1e-4                 # sliding in a step [dx] below which friction is not full
     rebuild_when: str = "never"         # also where a step was "shortened", or shows it "stale"
     max_iterations: int = 10000         # outer (the release)
     max_cg_iterations: int = 10000      # per linear solve (the release)
@@ -80,6 +81,8 @@ class SolverOptions:
         if not 0.0 <= self.displacement_tolerance < np.inf:
             raise ValueError(f"displacement_tolerance = {self.displacement_tolerance}: expected "
                              ">= 0, an error in grid spacings")
+        if not 0.0 < self.creep < np.inf:
+            raise ValueError(f"creep = {self.creep}: expected > 0, a sliding in grid spacings")
         if not self.eps > 0.0:
             raise ValueError(f"eps = {self.eps}: expected > 0")
         if not (self.patience >= 1 and 0.0 < self.penalty < np.inf):

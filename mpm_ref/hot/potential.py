@@ -6,6 +6,7 @@
 
 with the gravity b; heights are counted from the nodes at the start of the step. F_p^n is elastic:
 return maps are lagged (HOT-sec3.1-seq). Where g = 0, m_i dv_i / dt is the force after the step.
+Where planes rub, the dissipation of `friction` is part of E.
 
 The Hessian is an operator or a matrix (HOT-sec3.1-seq):
 
@@ -14,8 +15,8 @@ The Hessian is an operator or a matrix (HOT-sec3.1-seq):
 with L_p = sum_i u_i dw_ip^T. T_p is computed in principal space, see `quadrature.StressModes`.
 """
 
+from copy import copy
 from functools import cached_property
-from math import inf
 
 import numpy as np
 
@@ -24,7 +25,6 @@ from ..core.jit import CHUNKS, by_type, chunk, kernel, parallel, prange, total
 from ..core.spectral import rotation, svd
 from ..core.state import NONE, Grid
 from ..core.tensor import (
-    dot,
     identity,
     inner,
     mat,
@@ -32,14 +32,12 @@ from ..core.tensor import (
     mm,
     mmt,
     put_mat,
-    scale_columns,
-    total_of,
     transpose,
 )
 from ..materials import FixedCorotated, Fluid, Hencky, LogNeoHookean, NeoHookean, fluid, hencky
-from ..materials.log_strain import log_strain
 from ..materials.principal import apply, local, local_spd
-from .assembly import assembled, pattern_of
+from . import friction
+from .assembly import assembled, diagonal, pattern_of
 from .quadrature import StressModes, pairs_of, quadrature_points
 from .transfer import add_forces, gradients, largest_velocity
 
@@ -48,7 +46,10 @@ class Potential:
     """E of the velocity increments dv (n, d) [m/s] of a step of dt [s], on the nodes `unknowns`.
 
     Particles may have any law and are not changed; gravity (d,) is an acceleration [m/s^2].
+    `friction` is a `Friction` or None.
     """
+
+    friction = None
 
     def __init__(self, bodies, unknowns, stencil, dt, gravity):
         self.bodies, self.unknowns, self.stencil, self.dt = bodies, unknowns, stencil, dt
@@ -56,6 +57,18 @@ class Potential:
         self.box = box_of(unknowns)
         self.at = np.flatnonzero(unknowns.number.reshape(-1) >= 0)
         self.points = tuple(quadrature_points(body, self.box, stencil) for body in bodies)
+
+    def with_friction(self, friction):
+        """Return this potential with a `Friction` or None; they share all arrays."""
+        other = copy(self)
+        other.friction = friction
+        return other
+
+    def with_unknowns(self, unknowns):
+        """Return this potential with other conditions at the same nodes."""
+        other = copy(self)
+        other.unknowns = unknowns
+        return other
 
     def energy(self, dv):
         """Return E(dv) [J]; inf where a law refuses a deformation gradient."""
@@ -67,7 +80,13 @@ class Potential:
         g = self.scatter_forces()
         g += self.unknowns.m[:, None] * dv
         g -= self.dt * self.weight
+        self.add_friction(dv, g)
         return E, g
+
+    def add_friction(self, dv, g):
+        """Add dD/du (n, d) [kg m/s] of the friction, where there is some, to g."""
+        if self.friction is not None:
+            friction.add_gradient(self.friction, self.unknowns.v + dv, g)
 
     def tangent(self, dv, projected=True):
         """Return the `Tangent` at dv: dP/dF of every particle, without its negative
@@ -76,7 +95,13 @@ class Potential:
         self.gather_gradients(self.unknowns.v + dv)
         modes = tuple(stress_modes(points, body.law, self.dt, projected)
                       for body, points in zip(self.bodies, self.points))
-        return Tangent(self, modes)
+        return Tangent(self, modes, self.friction_blocks(dv))
+
+    def friction_blocks(self, dv):
+        """Return the nodes (K,) that rub, and their blocks (K, d, d) of the Hessian [kg]."""
+        if self.friction is None:
+            return np.zeros(0, dtype=np.int64), np.zeros((0, dv.shape[1], dv.shape[1]))
+        return self.friction.node, friction.blocks(self.friction, self.unknowns.v + dv)
 
     @cached_property
     def pattern(self):
@@ -113,6 +138,8 @@ class Potential:
         for body, points in zip(self.bodies, self.points):
             update_response(points, body.law, self.dt)
             E += total(points.psi)
+        if self.friction is not None:
+            E += friction.energy(self.friction, u)
         return float(E)
 
 
@@ -157,24 +184,13 @@ def fixed_corotated_response(F, law):
 
 
 @kernel
-def hencky_response(F, law):
-    """psi, P of the Hencky law from one singular value decomposition (NSF-eq13)."""
-    U, s, V, _ = svd(F)
-    psi = inf
-    if s[len(s) - 1] > 0.0:
-        eps = log_strain(s)
-        psi = law.mu * dot(eps, eps) + 0.5 * law.lam * total_of(eps) * total_of(eps)
-    return psi, mmt(scale_columns(U, hencky.pk1_hat(s, law)), V)
-
-
-@kernel
 def direct_response(F, law):
     """psi, P of a law that needs no decomposition."""
     return laws.psi(F, law), laws.pk1(F, law)
 
 
 energy_and_stress.method(FixedCorotated, fixed_corotated_response)
-energy_and_stress.method(Hencky, hencky_response)
+energy_and_stress.method(Hencky, hencky.psi_and_pk1)
 for _law in (NeoHookean, LogNeoHookean, Fluid):
     energy_and_stress.method(_law, direct_response)
 
@@ -195,22 +211,34 @@ def update_response(points, law, dt):
 class Tangent:
     """Hessian H = d2E/d dv2 [kg] of a `Potential` at one dv, without conditions."""
 
-    def __init__(self, potential, modes):
-        self.potential, self.modes = potential, modes
+    def __init__(self, potential, modes, of_friction):
+        self.potential, self.modes, self.of_friction = potential, modes, of_friction
 
     def product(self, u):
         """H u (n, d), without a matrix."""
         self.potential.gather_gradients(u)
         for points, modes in zip(self.potential.points, self.modes):
             _stress_changes_all(points, modes, tuple(range(u.shape[1])))
-        return self.potential.scatter_forces() + self.potential.unknowns.m[:, None] * u
+        Hu = self.potential.scatter_forces() + self.potential.unknowns.m[:, None] * u
+        node, blocks = self.of_friction
+        Hu[node] += np.einsum("kab,kb->ka", blocks, u[node])
+        return Hu
 
     def matrix(self):
         """Return H as a bsr_array of blocks (d, d), symmetric to the bit. A row has a block for
         every node in the stencil of 5^d (for quadratic splines) nodes around its own.
         """
-        q = self.potential
-        return assembled(tuple(zip(q.points, self.modes)), q.unknowns, q.pattern)
+        q, (node, blocks) = self.potential, self.of_friction
+        H = assembled(tuple(zip(q.points, self.modes)), q.unknowns, q.pattern, q.stencil)
+        H.data[q.pattern.diagonal[node]] += blocks
+        return H
+
+    def diagonal(self):
+        """Return the diagonal blocks (n, d, d) of H, without the matrix [kg]."""
+        q, (node, blocks) = self.potential, self.of_friction
+        D = diagonal(tuple(zip(q.points, self.modes)), q.unknowns, q.stencil)
+        D[node] += blocks
+        return D
 
 
 def stress_modes(points, law, dt, projected):

@@ -4,11 +4,12 @@ Nodes that particles connect move without elastic work along u_i = a + W y_i, wi
 y_i = x_i + dt (v_i + dv_i) the positions at the end of the step, since sum_i u_i dw_ip^T changes
 F_p by dt W F_p and P F^T is symmetric. So at the minimum of the potential (HOT-eq1)
 
-    sum_i u_i . m_i (dv_i - dt g) = 0
+    sum_i u_i . (m_i (dv_i - dt g) + dD/du_i) = 0
 
-for all of these motions that the conditions admit. No stiffness enters, while the tolerance of
-HOT-eq9 is relative to the stiffness: a solve within it may lose all weight, or the spin, of a
-stiff body. `RigidMotions.balanced` adds the rigid motion that restores the sums.
+for all of these motions that the conditions admit, with the dissipation D of `friction`. No
+stiffness enters, while the tolerance of HOT-eq9 is relative to the stiffness: a solve within it may
+lose all weight, or the spin, of a stiff body. `RigidMotions.balanced` adds the rigid motion that
+restores the sums.
 """
 
 from itertools import combinations
@@ -31,6 +32,7 @@ class RigidMotions:
 
     def __init__(self, potential, unknowns):
         self.unknowns, self.dt, self.weight = unknowns, potential.dt, potential.weight
+        self.potential = potential
         label = components(potential.points, unknowns.number, potential.stencil)
         self.order = np.argsort(label, kind="stable")
         self.label = label
@@ -51,15 +53,29 @@ class RigidMotions:
             slack = ROUND_OFF**2 * self.sums((m[:, None] * (kinetic + dv**2)).sum(axis=1))
             R = self.motions(dv)
             Z = self.admitted(R)
-            r = self.sums(np.einsum("naq,na->nq", R, m[:, None] * dv - self.dt * self.weight))
+            impulse = m[:, None] * dv - self.dt * self.weight
+            self.potential.add_friction(dv, impulse)
+            r = self.sums(np.einsum("naq,na->nq", R, impulse))
             rho = np.einsum("kqs,kq->ks", Z, r)
             off = (rho**2).sum(axis=1) > slack
             if not off.any():
                 return dv
-            c = np.einsum("kqs,ks->kq", Z, np.where(off[:, None], rho, 0.0))
+            rho = np.where(off[:, None], rho, 0.0)
+            c = np.einsum("kqs,ks->kq", Z, self.corrections(rho, R, Z, dv))
             u = np.einsum("naq,nq->na", R, c[self.label])
             dv = dv - np.einsum("nab,nb->na", self.unknowns.B, u)
         return dv
+
+    def corrections(self, rho, R, Z, dv):
+        """Return the steps of Newton's method that end the sums rho (parts, q) of motions R Z."""
+        if self.potential.friction is None:
+            return rho
+        node, blocks = self.potential.friction_blocks(dv)
+        part, R = self.label[node], R[node]
+        H = np.zeros_like(Z)
+        np.add.at(H, part, np.einsum("kaq,kab,kbs->kqs", R, blocks, R))
+        H = np.einsum("kqs,kqr,krt->kst", Z, H, Z) + np.eye(Z.shape[1])
+        return np.linalg.solve(H, rho[:, :, None])[:, :, 0]
 
     def motions(self, dv):
         """Return translations and rotations (n, d, d (d + 1)/2) of each node's part, without unit:

@@ -6,11 +6,13 @@ and, lagged, the return map.
 """
 
 from functools import partial
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core.grid import Storage
+from ..core.mls_slopes import mls_stencil
 from ..core.state import Grid
 from ..explicit import Stepper, scatter
 from .constraints import ActiveSet
@@ -21,7 +23,8 @@ from .potential import Potential
 from .report import combined_report
 from .system import System, Unknowns, free_part, unknowns_of
 
-MAX_UPDATES = 20      # of the active set; after that, nodes stay as they are
+MAX_UPDATES = 20      # of the active set and loads; after that, nodes stay as they are
+LOAD_CHANGE = 1e-3    # of the sum of frictions: smaller changes between two solves end the step
 
 
 class ImplicitProblem(NamedTuple):
@@ -50,6 +53,7 @@ class ImplicitStepper(Stepper):
         self.report = None
         self.active_set_updates = 0         # in the last solve
         check_scheme(scheme)
+        check_friction(conditions, self.options)
 
     def start(self, bodies):
         """Prepare the bodies, as `explicit.Stepper.start`. Raises ValueError for body forces of
@@ -87,8 +91,11 @@ class ImplicitStepper(Stepper):
         """`ImplicitProblem` of the step from time t [s] by dt [s]; the bodies stay as they are."""
         grid = scatter(bodies, self.storage, self.scheme, 0.0)
         unknowns, active_set = self._constrained(grid, self.conditions, t, dt)
-        stencil = self.scheme.stencil
+        stencil = potential_stencil(self.scheme)
         potential = Potential(bodies, unknowns, stencil, dt, self.gravity)
+        if active_set is not None:
+            impulse = first_impulse(unknowns, dt * self.gravity)
+            potential = potential.with_friction(self._friction(active_set, potential, impulse))
         kappa = characteristic_norms(bodies, unknowns, stencil, dt)
         coarse_grids = CoarseGrids(potential, partial(self.coarse_unknowns, bodies, t, dt))
         return ImplicitProblem(grid, unknowns, potential, kappa, active_set, dt * self.gravity,
@@ -104,9 +111,14 @@ class ImplicitStepper(Stepper):
         conditions = None if conditions is None else coarse_conditions(conditions, factor)
         return self._constrained(grid, conditions, t, dt)[0]
 
+    def _friction(self, active_set, potential, impulse):
+        """The `Friction` of a step, or None, of the impulse (n, d) [kg m/s] of the parts."""
+        eps = self.options.creep * self.dx / potential.dt
+        return active_set.friction(potential.unknowns, impulse, eps)
+
     def _constrained(self, grid, conditions, t, dt):
         """The unknowns of a grid under conditions, and their `ActiveSet` or None."""
-        unknowns = unknowns_of(grid)
+        unknowns = unknowns_of(grid, self.scheme.mass_eps)
         if conditions is None:
             return unknowns, None
         active_set = ActiveSet(conditions, grid, unknowns, t + dt, dt)
@@ -128,24 +140,61 @@ class ImplicitStepper(Stepper):
     def solve(self, problem):
         """Return the increment dv (n, d) [m/s] of a problem.
 
-        The active set of separate planes is updated between solves, each of which starts from the
-        result of the one before.
+        The active set of separate planes, and the loads that friction depends on, are updated
+        between solves, each of which starts from the result of the one before.
         """
         dv, reports = None, []
         for self.active_set_updates in range(MAX_UPDATES):
             solution = minimise(self.system(problem, dv), self.options)
             reports.append(solution.report)
             self.report, dv = combined_report(reports), solution.dv
-            if not (problem.active_set and self._updated(problem, dv)):
+            updated = self._updated(problem, dv)
+            if updated is None:
                 return dv
-            problem = problem._replace(unknowns=problem.active_set.apply(problem.unknowns))
+            problem = updated
         self.active_set_updates = MAX_UPDATES
-        self.report = self.report._replace(converged=False, message="separate planes still "
-                                           f"came or went after {MAX_UPDATES} solves")
+        self.report = self.report._replace(converged=False, message="separate planes or the loads "
+                                           f"of friction still changed after {MAX_UPDATES} solves")
         return dv
 
     def _updated(self, problem, dv):
-        return problem.active_set.update(problem.unknowns.v + dv, problem.potential.evaluate(dv)[1])
+        """The problem with the active set and friction of the increment dv; None for no change."""
+        active_set, unknowns, potential = problem.active_set, problem.unknowns, problem.potential
+        if active_set is None:
+            return None
+        impulse = potential.evaluate(dv)[1]
+        changed = active_set.update(unknowns.v + dv, impulse)
+        if changed:
+            unknowns = active_set.apply(unknowns)
+        if active_set.rubs:
+            potential = potential.with_unknowns(unknowns)
+            friction = self._friction(active_set, potential, impulse)
+            changed = changed or load_change(potential.friction, friction) > LOAD_CHANGE
+            potential = potential.with_friction(friction)
+        return problem._replace(unknowns=unknowns, potential=potential) if changed else None
+
+
+def potential_stencil(scheme):
+    """Return the stencil of force and velocity gradient of a scheme: that of their MLS form, whose
+    slopes belong to a potential of their own, or that of the splines.
+    """
+    return mls_stencil(scheme.degree) if scheme.transfer == "mls" else scheme.stencil
+
+
+def first_impulse(unknowns, gravity_increment):
+    """Return the impulse (n, d) [kg m/s] by which conditions change free fall."""
+    free = np.broadcast_to(gravity_increment, unknowns.v.shape)
+    admitted = unknowns.dv0 + free_part(unknowns, free - unknowns.dv0)
+    return unknowns.m[:, None] * (admitted - free)
+
+
+def load_change(old, new):
+    """Return the sum of the changes of two `Friction` or None over the sum of the new one."""
+    if old is None or new is None:
+        return 0.0 if old is new else inf
+    size = max(old.node.max(), new.node.max()) + 1
+    w = [np.bincount(friction.node, friction.w, size) for friction in (old, new)]
+    return float(np.abs(w[1] - w[0]).sum() / w[1].sum())
 
 
 def write_velocities(grid, unknowns, v):
@@ -161,18 +210,19 @@ def write_velocities(grid, unknowns, v):
     nodes[at] = v
 
 
+def check_friction(conditions, options):
+    """Raise ValueError for friction with a method that has no place for it."""
+    rubs = conditions is not None and any(part.friction for part in conditions.rules)
+    if rubs and options.descent == "admm":
+        raise ValueError("friction with the method 'admm': its splitting knows inertia and "
+                         "elasticity alone; expected another method, such as 'hot-plus'")
+
+
 def check_scheme(scheme):
     """Raise ValueError where a scheme has no implicit form."""
-    if scheme.transfer == "mls":
-        raise ValueError("transfer = 'mls' with an implicit integrator: expected 'apic', 'pic' or "
-                         "'flip', whose force is the gradient of an energy of the nodes; write "
-                         "scheme = { transfer = \"apic\" }")
     if scheme.relaxation:
         raise ValueError(f"relaxation = {scheme.relaxation} with an implicit integrator: it "
                          "belongs to explicit steps; leave it out")
-    if scheme.mass_eps or scheme.gravity_on_empty:
-        raise ValueError("mass_eps and gravity_on_empty belong to explicit NCLaw scenes: leave "
-                         "them out with an implicit integrator")
     if scheme.gimp:
         raise ValueError(f"gimp = {scheme.gimp} with an implicit integrator: its matrices are "
                          "those of splines; expected gimp = 0, or integrator = \"explicit\"")

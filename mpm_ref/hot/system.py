@@ -6,7 +6,6 @@ import numpy as np
 
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..core.tensor import mat, mm, put_mat
-from .assembly import diagonal
 from .rigid import RigidMotions
 
 
@@ -26,14 +25,16 @@ class Unknowns(NamedTuple):
     dx: float             #               grid spacing [m]
 
 
-def unknowns_of(grid):
-    """`Unknowns` of a grid that holds mass and momentum, with no conditions."""
+def unknowns_of(grid, mass_eps=0.0):
+    """`Unknowns` of a grid that holds mass and momentum, with no conditions. mass_eps [kg] is added
+    to the mass of each node, as in the explicit step.
+    """
     d = grid.m.ndim
     flat = np.flatnonzero(grid.m.reshape(-1) > 0.0)
     number = np.full(grid.m.size, -1, dtype=np.int32)
     number[flat] = np.arange(len(flat))
     index = np.stack(np.unravel_index(flat, grid.m.shape), axis=1) + grid.origin
-    m = grid.m.reshape(-1)[flat]
+    m = grid.m.reshape(-1)[flat] + mass_eps
     v = grid.v.reshape(-1, d)[flat] / m[:, None]
     B = np.tile(np.eye(d), (len(flat), 1, 1))
     number = number.reshape(grid.m.shape)
@@ -111,8 +112,8 @@ class System:
 
     def diagonal(self, dv):
         """Diagonal blocks (n, d, d) of B H B at dv, without the matrix [kg]."""
-        q, B, modes = self.potential, self.unknowns.B, self.tangent(dv).modes
-        return B @ diagonal(zip(q.points, modes), self.unknowns, q.stencil) @ B
+        B = self.unknowns.B
+        return B @ self.tangent(dv).diagonal() @ B
 
 
 def constrained(H, B):

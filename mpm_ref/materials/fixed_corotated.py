@@ -12,8 +12,21 @@ through inversion; there, b_ij would be -inf and is bounded.
 from typing import NamedTuple
 
 from ..core.jit import kernel
-from ..core.spectral import rotation, stretch
-from ..core.tensor import fill, identity, inner, lin, mlin, mmt, mul
+from ..core.spectral import rotation, skew_quotient, stretch
+from ..core.tensor import (
+    cofactor,
+    dot,
+    fill,
+    identity,
+    inner,
+    lin,
+    mlin,
+    mm,
+    mmt,
+    mul,
+    trace,
+    transpose,
+)
 from . import fluid, principal
 from .moduli import lame
 
@@ -80,6 +93,23 @@ def kirchhoff_hat(s, law):
     """Return the principal tau_i = 2 mu s_i (s_i - 1) + lam (J - 1) J [Pa]."""
     x = mul(s, lin(1.0, s, -1.0, fill(1.0, s)))
     return lin(2.0 * law.mu, x, 1.0, fluid.kirchhoff_hat(s, law))
+
+
+@kernel
+def kirchhoff_vjp_of_polar(F, parts, tau_bar, law):
+    """Return F_bar of tau = `kirchhoff_of_stretch` at F = V R, parts = (V, R), det F not near 0.
+
+    With T the symmetric part of tau_bar and its spin Z = `skew_quotient`(T V, V), which turns R as
+    F changes:  F_bar = 2 mu (2 T F - (T + Z) R) + lam (2 J - 1) (tr T) cof F
+    """
+    V, R = parts
+    T = mlin(0.5, tau_bar, 0.5, transpose(tau_bar))
+    Z = skew_quotient(mm(T, V), V)
+    turned = mm(mlin(1.0, T, 1.0, Z), R)
+    shear = mlin(4.0 * law.mu, mm(T, F), -2.0 * law.mu, turned)
+    K = cofactor(F)
+    J = dot(F[0], K[0])
+    return mlin(1.0, shear, law.lam * (2.0 * J - 1.0) * trace(T), K)
 
 
 @kernel

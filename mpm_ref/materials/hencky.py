@@ -15,11 +15,15 @@ from ..core.jit import kernel
 from ..core.logarithm import hencky_strain
 from ..core.spectral import svd
 from ..core.tensor import (
+    cofactor,
+    det,
     diag,
     dot,
     fill,
+    inner,
     lin,
     mlin,
+    mm,
     mmt,
     mul,
     outer,
@@ -64,18 +68,38 @@ def units(law):
 @kernel
 def psi(F, law):
     """Return the energy per rest volume [J/m^3]; inf unless det F > 0."""
-    _, s, _, _ = svd(F)
-    if not s[len(s) - 1] > 0.0:
-        return inf
-    eps = log_strain(s)
-    return law.mu * dot(eps, eps) + 0.5 * law.lam * total_of(eps) * total_of(eps)
+    return psi_and_pk1(F, law)[0]
 
 
 @kernel
 def pk1(F, law):
     """Return P = U diag(pk1_hat(s)) V^T [Pa]; NaN unless det F > 0."""
+    return psi_and_pk1(F, law)[1]
+
+
+@kernel
+def psi_and_pk1(F, law):
+    """Return `psi` and `pk1`; of moderate strains without singular values: P = tau cof(F)/J."""
+    eps, moderate = hencky_strain(F)
+    if moderate:
+        J, tau = det(F), kirchhoff_of_strain(eps, law)
+        return psi_of_strain(eps, law), scale(1.0 / J, mm(tau, cofactor(F)))
     U, s, V, _ = svd(F)
-    return mmt(scale_columns(U, pk1_hat(s, law)), V)
+    energy = psi_hat(s, law) if s[len(s) - 1] > 0.0 else inf
+    return energy, mmt(scale_columns(U, pk1_hat(s, law)), V)
+
+
+@kernel
+def psi_of_strain(eps, law):
+    """Return mu |eps|^2 + lam/2 (tr eps)^2 [J/m^3] of eps = log(F F^T)/2."""
+    return law.mu * inner(eps, eps) + 0.5 * law.lam * trace(eps) * trace(eps)
+
+
+@kernel
+def psi_hat(s, law):
+    """Return the energy per rest volume [J/m^3] of singular values s > 0."""
+    eps = log_strain(s)
+    return law.mu * dot(eps, eps) + 0.5 * law.lam * total_of(eps) * total_of(eps)
 
 
 @kernel

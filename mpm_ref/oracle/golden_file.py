@@ -159,11 +159,27 @@ def require_recordable(problem):
     if problem.scheme.gimp:
         raise ValueError(f"gimp = {problem.scheme.gimp}: golden files have weights of splines; "
                          "expected a scene with gimp = 0")
+    check_implicit(problem)
     for body in problem.bodies:
         for part, table in ((body.law, LAWS), (body.flow, FLOWS)):
             if type(part).__name__ not in table:
                 raise ValueError(f"body {body.name!r}: {type(part).__name__} is not known to the "
                                  f"plain twin; expected one of {', '.join(sorted(table))}")
+
+
+def check_implicit(problem):
+    """Raise ValueError for the forms of the implicit step that its plain twin does not have."""
+    if problem.integrator != "implicit":
+        return
+    if problem.scheme.transfer == "mls":
+        raise ValueError("transfer = 'mls' with an implicit integrator: its plain twin has the "
+                         "gradient form alone; expected 'apic', 'pic' or 'flip'")
+    if problem.conditions is not None and any(part.friction for part in problem.conditions.rules):
+        raise ValueError("friction with an implicit integrator: its plain twin has none; expected "
+                         "a scene without, or integrator = \"explicit\"")
+    if problem.scheme.mass_eps:
+        raise ValueError(f"mass_eps = {problem.scheme.mass_eps} with an implicit integrator: its "
+                         "plain twin has none; expected 0")
 
 
 def put_problem(f, problem):

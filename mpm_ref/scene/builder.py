@@ -224,11 +224,6 @@ def build_solver(scene):
         raise SceneError(f"integrator = {scene.integrator!r}: {NAMES}")
     with errors_at("scheme"):
         check_scheme(scene.step_scheme)
-    parts = {f"collider[{k}]": part for k, part in enumerate(scene.collider)}
-    for name, part in (parts | {"walls": scene.walls}).items():
-        if part is not None and part.friction:
-            raise SceneError(f"{name}.friction = {part.friction}: expected 0 with an implicit "
-                             "integrator; friction has no potential")
     if scene.boundary != "nodes":
         raise SceneError(f"boundary = {scene.boundary!r}: expected \"nodes\" with an implicit "
                          "integrator, whose constraints hold at nodes")

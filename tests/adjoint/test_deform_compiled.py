@@ -9,7 +9,8 @@ from problems import run_python
 from threads import MOST, by_threads
 
 from mpm_ref.core.adjoint import deform
-from mpm_ref.materials import NoFlow
+from mpm_ref.core.jit import CHUNKS
+from mpm_ref.materials import FixedCorotated, NoFlow
 
 CASES = {"von_mises_hardening": 3, "none on fixed_corotated": 3, "fluid of J": 2}
 N = 150             # more particles than chunks
@@ -72,6 +73,22 @@ def test_as_the_plain_text(plain, name):
     law, flow, _ = materials(CASES[name])[name]
     expected = {key: np.array(g) for key, g in plain[name].items()}
     assert max(apart(named(*driven(name), law, flow), expected).values()) < 1e-13
+
+
+def test_without_singular_values_as_with_them():
+    """Far from singular, through rest, and where the loop falls back to singular values."""
+    law = FixedCorotated(300.0, 500.0)
+    rng = np.random.default_rng(6)
+    s = np.exp(0.3 * rng.standard_normal((N, 3)))
+    s[:20], s[20:40, 2], s[40:60] = 1.0, 1e-3, s[40:60] * (1.0, 1.0, -1.0)
+    q = states(rng, s, (law, NoFlow(), False))
+    found = []
+    for run in (deform.elastic_vjp_of_polar, deform.elastic_vjp):
+        bars, step, like = seeds(q, law, NoFlow())
+        for c in range(CHUNKS):
+            run(step, bars, law, like, c)
+        found.append(named(bars, step.sums, law, NoFlow()))
+    assert max(apart(*found).values()) < 1e-13
 
 
 @pytest.mark.skipif(MOST < 2, reason="one core")

@@ -10,6 +10,7 @@ from mpm_ref.core.motion import Motion, Steady
 from mpm_ref.core.state import NONE
 from mpm_ref.explicit import Scheme
 from mpm_ref.hot.constraints import FIXED, FREE, PLANE, RELEASES, ActiveSet
+from mpm_ref.hot.methods import options_of
 from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.hot.system import free_part, unknowns_of
 
@@ -118,10 +119,26 @@ def test_relaxation_is_refused():
         ImplicitStepper(scheme, 0.1, 2, (0.0, 0.0))
 
 
-def test_friction_is_refused():
-    rough = Collider(sphere((0.0, 0.0), 1.0), "slip", friction=0.2)
-    with pytest.raises(ValueError, match=r"friction = 0\.2 with an implicit integrator"):
-        restrained([rough])
+def test_friction_is_that_of_the_loads_of_active_planes():
+    """Coulomb's: mu times the load of each plane, and the mean of what they rub on."""
+    motion = Motion(Steady((0.3, 0.0)))
+    floor = Collider(half_space((0.0, 0.0), (0.0, 1.0)), "separate", friction=0.5, motion=motion)
+    wall = Collider(half_space((0.0, 0.0), (1.0, 0.0)), "slip", friction=0.25)
+    active_set, q = restrained([floor, wall], u=np.full((15, 2), -1.0))
+    impulse = np.tile((-3.0, 2.0), (len(q.m), 1))
+    friction = active_set.friction(q, impulse, 1e-3)
+    x = q.index[friction.node]
+    on_floor, on_wall = x[:, 1] <= 0, x[:, 0] <= 0
+    assert np.array_equal(friction.w, 0.5 * 2.0 * on_floor + 0.25 * 3.0 * on_wall)
+    assert np.allclose(friction.c[:, 0], 0.3 * on_floor / friction.w, rtol=1e-15)
+    assert np.array_equal(friction.B, q.B[friction.node])
+    assert active_set.friction(q, -impulse, 1e-3).w.max() == 0.75    # a slip plane bears both ways
+
+
+def test_admm_refuses_friction():
+    rough = Conditions((Collider(sphere((0.0, 0.0), 1.0), "slip", friction=0.2),))
+    with pytest.raises(ValueError, match="friction with the method 'admm'"):
+        ImplicitStepper(Scheme(transfer="apic"), 0.1, 2, (0.0, 0.0), rough, options_of("admm"))
 
 
 def test_conditions_that_touch_nothing_change_nothing():

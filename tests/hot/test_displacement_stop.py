@@ -28,7 +28,7 @@ def step(request):
 def test_largest_velocity_is_that_of_a_particle(case):
     q = problem_of(case)
     v = [transfer.velocity(over(q, q.w), ip, box)
-         for _, ip, box in plain_bodies(q, case.degree)]
+         for _, ip, box in plain_bodies(q, case)]
     farthest = max(np.linalg.norm(v_p, axis=1).max() for v_p in v)
     assert q.potential.largest_velocity(q.w) == pytest.approx(farthest, rel=1e-13)
 

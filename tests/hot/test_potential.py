@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from constitutive import rate
-from hot_cases import CASES, DEGREES, DT, over, plain_bodies, problem_of
+from hot_cases import CASES, DEGREES, DT, MLS, over, plain_bodies, problem_of
 from threads import by_threads
 
 from mpm_ref.hot import transfer
@@ -13,7 +13,7 @@ from mpm_ref.plain import potential
 
 H = np.geomspace(1e-1, 1e-3, 5)
 LONG = 200.0        # cells: many slabs, for threads to meet in
-ALL = CASES + DEGREES
+ALL = CASES + DEGREES + MLS
 
 
 @pytest.fixture(params=ALL, ids=lambda case: case.name, scope="module")
@@ -30,7 +30,7 @@ def potential_like(problem, bodies=None, gravity=None):
 def test_equals_the_plain_twin(at):
     case, q = at
     v = over(q, q.unknowns.v)
-    expected = potential.evaluate(plain_bodies(q, case.degree), q.grid.m, v, over(q, q.dv), DT,
+    expected = potential.evaluate(plain_bodies(q, case), q.grid.m, v, over(q, q.dv), DT,
                                   q.gravity)
     E, g = q.potential.evaluate(q.dv)
     assert E == pytest.approx(expected[0], rel=1e-13)
@@ -80,9 +80,10 @@ def test_bodies_add_up():
     assert np.abs(g - apart).max() <= 1e-14 * np.abs(g).max()
 
 
-def test_the_fast_exchange_equals_the_plain_one(rng):
+@pytest.mark.parametrize("case", [CASES[2], MLS[2]], ids=lambda case: case.name)
+def test_the_fast_exchange_equals_the_plain_one(case, rng):
     """Lines of nodes instead of nodes: the same sums in another order."""
-    q = problem_of(CASES[2])
+    q = problem_of(case)
     points, box, stencil = q.potential.points[0], q.potential.box, q.potential.stencil
     box.v[:] = rng.normal(size=box.v.shape)
     transfer.gradients(points, box, stencil)

@@ -194,8 +194,6 @@ def test_steps_follow_the_speed_of_what_drives_them(low, moves):       # HOT-dt
 
 
 def test_what_has_no_implicit_form_is_refused():
-    with pytest.raises(ValueError, match="'mls' with an implicit"):
-        ImplicitStepper(Scheme(), DX, 2, NOTHING)
     with pytest.raises(ValueError, match="f_bar = true with an implicit integrator"):
         ImplicitStepper(Scheme(transfer="apic", f_bar=True), DX, 2, NOTHING)
     with pytest.raises(ValueError, match=r"gimp = 2.0 with an implicit integrator: its matrices"):

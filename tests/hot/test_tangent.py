@@ -2,18 +2,16 @@
 
 import numpy as np
 import pytest
-from clouds import DX
 from constitutive import LAW, evaluate, rate
-from hot_cases import CASES, DEGREES, DT, problem_of
+from hot_cases import CASES, DEGREES, DT, MLS, problem_of
 from scipy.sparse import block_diag, bsr_array, csr_array
 from threads import by_threads
 
 from mpm_ref.hot.assembly import pattern_of
-from mpm_ref.plain.spline import pairs
 
 H = np.geomspace(1e-1, 1e-3, 5)
 LONG = 200.0        # cells: many slabs, for threads to meet in
-ALL = CASES + DEGREES
+ALL = CASES + DEGREES + MLS
 WIDE = 0.6      # spread of log stretches: then the exact Hessian has negative eigenvalues
 
 
@@ -26,9 +24,9 @@ def largest(a):
     return np.abs(a).max()
 
 
-def gradients_of(body, unknowns, degree):
+def gradients_of(body, unknowns, case):
     """The matrix (N d d, n d) that maps nodal velocities to L_p, row by row (NSF-alg-mpm)."""
-    ip, d = pairs(body.particles.x, DX, degree), body.particles.x.shape[1]
+    ip, d = case.pairs(body.particles.x), body.particles.x.shape[1]
     node = unknowns.number[tuple(np.moveaxis(ip.node - unknowns.origin, -1, 0))]
     p, _, a, b = np.indices((*node.shape, d, d)).reshape(4, -1)
     row, column = (p * d + a) * d + b, np.repeat(node.reshape(-1), d * d) * d + a
@@ -51,7 +49,7 @@ def reference(q, case, projected=True):
     d, n = case.d, len(q.unknowns.m)
     out = csr_array((np.repeat(q.unknowns.m, d), (np.arange(n * d),) * 2), (n * d, n * d))
     for body in q.bodies:
-        G = gradients_of(body, q.unknowns, case.degree)
+        G = gradients_of(body, q.unknowns, case)
         L = (G @ (q.unknowns.v + q.dv).reshape(-1)).reshape(-1, d, d)
         F_n = body.particles.F
         if F_n.ndim == 1:

@@ -120,7 +120,9 @@ def gradients(q, law, flow):
         if q.F.ndim == 1:
             adjoint.fluid_vjp(step, bars, law, like, c)
         elif isinstance(flow, NoFlow):
-            adjoint.elastic_vjp(step, bars, law, like, c)
+            polar = adjoint.has_polar(law, len(like))
+            run = adjoint.elastic_vjp_of_polar if polar else adjoint.elastic_vjp
+            run(step, bars, law, like, c)
         else:
             adjoint.plastic_vjp(step, bars, law, flow, like, c)
     return named(bars, step.sums, law, flow)

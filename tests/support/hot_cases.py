@@ -8,6 +8,7 @@ from constitutive import LAW, states
 
 from mpm_ref.body import Body, particles_at
 from mpm_ref.core.grid import Grid
+from mpm_ref.core.mls_slopes import mls_stencil
 from mpm_ref.core.spline import STENCILS
 from mpm_ref.core.state import NONE
 from mpm_ref.hot.potential import Potential
@@ -21,15 +22,29 @@ SPEED = 0.1 * DX / DT       # strains of a step are about 0.1
 
 
 class Case(NamedTuple):
-    """Dimension, degree of the splines, and the law of each body; bodies overlap."""
+    """Dimension, degree of the splines, the law of each body, and whether slopes are those of the
+    MLS form; bodies overlap.
+    """
 
     d: int
     degree: int
     laws: tuple
+    mls: bool = False
 
     @property
     def name(self):
-        return f"{self.d}d-degree{self.degree}-" + "-".join(self.laws)
+        form = "mls-" * self.mls
+        return f"{self.d}d-{form}degree{self.degree}-" + "-".join(self.laws)
+
+    @property
+    def stencil(self):
+        return mls_stencil(self.degree) if self.mls else STENCILS[self.degree]
+
+    def pairs(self, x):
+        """Pairs of particles and nodes, with D^-1 w_ip r_ip for dw_ip in the MLS form."""
+        ip = pairs(x, DX, self.degree)
+        D = DX**2 * (self.degree + 1) / 12
+        return ip._replace(dw=ip.w[..., None] * ip.r / D) if self.mls else ip
 
 
 # What is compiled costs seconds: each law once, the paper's one in both dimensions.
@@ -39,6 +54,8 @@ CASES = (
     Case(3, 2, ("fixed_corotated",)),
 )
 DEGREES = (Case(2, 1, ("fixed_corotated",)), Case(2, 3, ("fixed_corotated",)))
+MLS = (Case(2, 2, ("fixed_corotated", "neo_hookean"), mls=True),
+       Case(2, 3, ("fixed_corotated",), mls=True), Case(3, 2, ("fixed_corotated",), mls=True))
 
 
 class Problem(NamedTuple):
@@ -96,7 +113,7 @@ def problem_of(case, spread=0.2, length=2.5):
     unknowns = unknowns_of(grid)
     gravity = rng.normal(size=case.d) * SPEED / DT
     dv, w = SPEED * rng.normal(size=(2, *unknowns.v.shape))
-    potential = Potential(bodies, unknowns, STENCILS[case.degree], DT, gravity)
+    potential = Potential(bodies, unknowns, case.stencil, DT, gravity)
     return Problem(potential, bodies, unknowns, grid, gravity, dv, w)
 
 
@@ -107,8 +124,7 @@ def over(problem, u):
     return out
 
 
-def plain_bodies(problem, degree):
+def plain_bodies(problem, case):
     """Particles, pairs and box for `plain.potential`."""
     box = transfer.NodeBox(problem.grid.origin, problem.grid.m.shape)
-    return [(twin(b.particles, b.law), pairs(b.particles.x, DX, degree), box)
-            for b in problem.bodies]
+    return [(twin(b.particles, b.law), case.pairs(b.particles.x), box) for b in problem.bodies]

@@ -63,9 +63,9 @@ def bowl_scene(dx):
                  collider=(Collider(shape=around, kind="separate", inside=True),))
 
 
-def swing(dx):
-    """Run until the centre of mass has passed the bottom."""
-    problem, rows = build(bowl_scene(dx)), []
+def swing(problem):
+    """Run a problem of `bowl_scene` until the centre of mass has passed the bottom."""
+    rows = []
     q = problem.bodies[0].particles
     k2 = float(q.m @ np.sum(q.x**2, axis=1) / q.m.sum())
     center = mean(problem.bodies[0], "x")
@@ -98,7 +98,7 @@ def bowl(run):
     """Record the speed at the bottom against the pendulum's."""
     rows = []
     for dx in run.progress(run.choose(quick=(0.1, 0.05), standard=(0.1, 0.05, 0.025)), "dx"):
-        s = swing(dx)
+        s = swing(build(bowl_scene(dx)))
         rows += [(dx, *row) for row in zip(s.t, s.omega, s.energy, strict=True)]
     run.table("course", ("dx", "t", "omega", "energy"), rows)
     scale = f"{s.particles} particles, {s.steps} steps, dx = {dx} m, bowl of 1 m"

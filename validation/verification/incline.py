@@ -137,8 +137,9 @@ def released(problem, slope, v0):
     It comes to rest under the gravity of `block_scene` by PIC, which damps; then all of gravity
     acts, and MLS-MPM takes over.
     """
-    for frame in simulate(problem):
-        rest = frame.state.bodies[0]
+    with threads_for(problem.bodies):
+        for frame in simulate(problem):
+            rest = frame.state.bodies[0]
     q = rest.particles
     v = np.tile(v0 * slope.along, (len(q.x), 1))
     moving = particles_at(q.x, v, q.m, q.V0, "mls")
@@ -149,10 +150,14 @@ def released(problem, slope, v0):
 
 def slide(slope, E, dx, v0=0.0, sudden=True):
     """Return the `Slide` of `DURATION` seconds from speed v0 [m/s]; E [Pa], spacing dx [m]."""
-    problem, rows = build(block_scene(slope, E, dx, sudden)), []
+    problem = released(build(block_scene(slope, E, dx, sudden)), slope, v0)
+    return course(replace(problem, clock=Clock(end=DURATION, interval=DURATION / SHOWN)), slope)
+
+
+def course(problem, slope):
+    """Return the `Slide` of a problem of the block on a slope."""
+    rows = []
     with threads_for(problem.bodies):
-        problem = released(problem, slope, v0)
-        problem = replace(problem, clock=Clock(end=DURATION, interval=DURATION / SHOWN))
         for frame in simulate(problem):
             x, v = (mean(frame.state.bodies[0], name) for name in "xv")
             rows.append((frame.t, x @ slope.along, v @ slope.along, x @ slope.normal,

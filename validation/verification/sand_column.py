@@ -10,6 +10,7 @@ Exponents as the abstracts of their papers state them: in plane channels 0.65 +-
 [Lube2005] and [Lube2004] are quoted so in later work; the papers are not at hand: `unconfirmed`.
 """
 
+from itertools import combinations
 from math import sqrt
 from typing import NamedTuple
 
@@ -44,6 +45,7 @@ EXPONENT = {                    # of tall columns: band, and why
                     "column has no side walls"),
     3: ((0.47, 0.57), "0.52 with the +- 0.05 that the plane channels' exponents have"),
 }
+SAME = 0.05                     # that exponents over the same ratios may differ on two grids
 STEADY = 0.05                   # of the run-out: change that a third of the time step may make
 FRICTION = "friction angle 30 degrees, rough floor"
 
@@ -164,7 +166,7 @@ def sand_column(run):
         quick=((2, 6, (4.0, 8.0)), (3, 4, (2.0,))),
         standard=((2, 8, (0.5, 1.0, 2.0, 4.0, 8.0)), (2, 16, (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)),
                   (2, 32, (0.5, 1.0, 2.0, 4.0)), (3, 6, (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)),
-                  (3, 10, (0.5, 1.0, 2.0, 4.0, 8.0))))
+                  (3, 10, (0.5, 1.0, 2.0, 4.0, 8.0, 16.0))))
     columns = [SandColumn(dim, a, cells) for dim, cells, ratios in plans for a in ratios]
     collapses = {column: collapse(column) for column in run.progress(columns, "columns")}
     for column, c in collapses.items():
@@ -173,6 +175,9 @@ def sand_column(run):
         record_exponent(run, {column.a: (column, c) for column, c in collapses.items()
                               if (column.dim, column.cells) == (dim, cells)
                               and column.a > TALL[dim]})
+    for dim in (2, 3):
+        record_grids(run, {column: c for column, c in collapses.items()
+                           if column.dim == dim and column.a > TALL[dim]})
     record_time_steps(run, *run.choose(quick=(4, ("flip", "mls")),
                                        standard=(8, ("flip", "apic", "mls"))))
     write_tables(run, collapses)
@@ -200,6 +205,28 @@ def record_exponent(run, tall):
                scale=f"aspect ratios {', '.join(f'{a:g}' for a in ratios)}; {FRICTION}",
                note=f"{why}; from ratio to ratio {', '.join(f'{p:.2f}' for p in local)}, so that a "
                "power law is reached at best by the tallest")
+
+
+def record_grids(run, tall):
+    """Record by how much the exponents of tall columns {column: collapse} differ between
+    the two grids with the most common aspect ratios, over these.
+    """
+    grids = sorted({column.cells for column in tall})
+    ratios = {n: {column.a for column in tall if column.cells == n} for n in grids}
+    shared, coarse, fine = max(
+        ((sorted(ratios[m] & ratios[n]), m, n) for m, n in combinations(grids, 2)),
+        key=lambda row: len(row[0]), default=((), 0, 0))
+    if len(shared) < 2:
+        return
+    runouts = {(column.cells, column.a): c.runout for column, c in tall.items()}
+    exponents = [order(shared, [runouts[n, a] for a in shared]) for n in (coarse, fine)]
+    kind = next(iter(tall)).kind
+    run.record(f"verification.column.{kind}.grids", exponents[1] - exponents[0],
+               comparator="band", bound=(-SAME, SAME),
+               scale=f"aspect ratios {', '.join(f'{a:g}' for a in shared)}; L = {coarse}, {fine} "
+               f"dx; {FRICTION}",
+               note=f"difference of the exponents over the same ratios, {exponents[0]:.2f} and "
+               f"{exponents[1]:.2f}; the exponent of each grid above is over all of its ratios")
 
 
 def record_time_steps(run, cells, transfers):

@@ -4,7 +4,8 @@
 its nodes; the exact frequency is that of `bar`. *ring*: torsional vibration of a ring between two
 cylinders that hold it, u_theta = A cos(omega t) (J_1(k r) Y_1(k a) - Y_1(k r) J_1(k a)), omega =
 k sqrt(mu/rho), where k is the first root of the bracket at r = b: curved walls. *cantilever*: a
-beam clamped at its end. *incline*: a block that slides on a plane along the grid or inclined.
+beam clamped at its end. *mms*: the manufactured solution of `mms` between slip walls. *incline*: a
+block that slides on a plane along the grid or inclined.
 
 A wall that acts a depth delta behind its surface lengthens the bar by delta, and the gap of the
 ring by 2 delta: the depth follows from the frequency.
@@ -27,11 +28,12 @@ from mpm_ref.materials import FixedCorotated, NoFlow, lame, stiffness
 
 from ..common.registry import experiment
 from ..common.scenes import threads_for
-from . import bar
+from . import bar, mms
 from .cantilever import Support, small_error
 from .convergence import order
 from .incline import SLIDING, STIFFNESS, THETA, Slope, slide
 from .lattice import body, lattice
+from .manufactured import follow
 from .mms import name
 from .symplectic import distance_travelled
 
@@ -106,6 +108,7 @@ INNER, OUTER = 0.75, 1.25
 RING = FixedCorotated(*lame(100.0, 0.3))
 AMPLITUDE = 1e-4                    # of the displacement [m]: the response is linear
 CENTER = np.array([0.13, 0.29])     # of the ring, from a node [cells]
+CORNER = np.array([0.3, 0.6])       # of the square of the manufactured solution, likewise
 
 
 def bracket(k, r):
@@ -157,6 +160,36 @@ def ring_mode(X, k, omega):
     return v[:, None] * around, growth
 
 
+# a square that moves between walls as a manufactured solution says
+
+class Shifted(mms.AxisAligned):
+    """The motion of a square whose corner is at a point `corner` (2,) [m]."""
+
+    def __init__(self, X, corner):
+        super().__init__(X, mms.LAW, mms.RHO0, mms.A, mms.C)
+        self.corner = corner
+
+    def position(self, t):
+        """Return x (N, 2) [m]."""
+        return self.corner + super().position(t)
+
+
+def mms_error(scheme, cells, conditions):
+    """Return the error of `verification.mms` between four slip walls that lie between nodes.
+
+    Along a wall the solution moves tangentially and is not sheared, as a slip wall has it.
+    """
+    transfer, degree, per = scheme
+    dx = 1.0 / cells
+    X, corner = lattice([0.0, 0.0], [1.0, 1.0], dx / per), CORNER * dx
+    square = body(X, dx / per, mms.RHO0, mms.LAW, transfer)
+    sides = [(corner, n) for n in np.eye(2)] + [(corner + 1.0, -n) for n in np.eye(2)]
+    walls = tuple(Collider(half_space(point, normal), "slip") for point, normal in sides)
+    stepper = Stepper(Scheme(degree, transfer), dx, 2, np.zeros(2), conditions(walls))
+    dt = mms.CFL * dx / mms.SOUND
+    return follow(square, Shifted(X, corner), stepper, 2.0 / mms.C, dt) / mms.A
+
+
 # the experiment
 
 @experiment("verification.surface", title="Walls at their surface: bar, ring, cantilever, incline",
@@ -168,6 +201,7 @@ def surface(run):
     record_bars(run, schemes)
     record_rings(run, schemes)
     record_cantilever(run, schemes[:2])
+    record_mms(run)
     record_incline(run)
 
 
@@ -224,6 +258,21 @@ def record_cantilever(run, schemes):
                    order([1.0 / n for n in cells], [abs(e) for e in errors]), **ORDER,
                    scale=f"{cells} cells over the height, small load")
     run.table("cantilever", ("transfer", "degree", "per_direction", "cells", "error"), rows)
+
+
+def record_mms(run):
+    """Record the order of the manufactured solution between walls."""
+    cells, rows = run.choose(quick=(16, 32), standard=mms.CELLS), []
+    for scheme in run.progress(run.choose(quick=mms.SECOND_ORDER[1:], standard=mms.SECOND_ORDER),
+                               "manufactured solutions"):
+        for kind, conditions in BOUNDARIES.items():
+            errors = [mms_error(scheme, n, conditions) for n in cells]
+            rows += [(*scheme, kind, n, e) for n, e in zip(cells, errors, strict=True)]
+            rule = ORDER if kind == "surface" else {"comparator": "info"}
+            run.record(f"verification.surface.mms.{kind}.{name(scheme)}.order",
+                       order([1.0 / n for n in cells], errors), **rule,
+                       scale=f"{cells} cells per side, walls {CORNER} cells from nodes")
+    run.table("mms", ("transfer", "degree", "per_direction", "boundary", "cells", "error"), rows)
 
 
 def record_incline(run):

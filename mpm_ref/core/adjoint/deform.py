@@ -6,11 +6,11 @@ For every quantity X, `X_bar` (in arrays: bars.X) is d loss / dX. Given the bars
 leaves, these functions put in their place those of what it found, write the bar of L, and add the
 bars of the parameters. NCLaw's training differentiates the same step (NCLAW-eq5).
 
-Everything is differentiated in the principal axes F_trial = U diag(s) V^T, where it falls apart
-into a function of s and, for each pair of axes, two numbers: (s'_i - s'_j)/(s_i - s_j) for the
-symmetric part and (s'_i + s'_j)/(s_i + s_j) for the skew part. The laws give the first in closed
-form, so that repeated singular values need no care. A return map is differentiated in the branch
-that it takes.
+All but fixed corotated elasticity is differentiated in the principal axes F_trial = U diag(s) V^T,
+where it falls apart into a function of s and, for each pair of axes, two numbers:
+(s'_i - s'_j)/(s_i - s_j) for the symmetric part and (s'_i + s'_j)/(s_i + s_j) for the skew part.
+The laws give the first in closed form, so that repeated singular values need no care. A return map
+is differentiated in the branch that it takes.
 
 Chunk c of the particles adds to row c of sums (CHUNKS, n), whose columns are the parameters of the
 law, then of the flow: the same bits for any number of threads. Their bars are sums.sum(axis=0).
@@ -27,15 +27,29 @@ from ..law import (
     gap_ratio,
     intact,
     kirchhoff_hat,
+    kirchhoff_of_stretch,
     kirchhoff_vjp,
+    kirchhoff_vjp_of_polar,
     pressure,
     project,
     project_vjp,
     units,
 )
-from ..spectral import UNDETERMINED, mixed, svd
+from ..spectral import UNDETERMINED, mixed, rotation_without_svd, svd
 from ..state import growth
-from ..tensor import cofactor, det, diagonal, dot, mat, mlin, mm, mmt, put_mat, transpose
+from ..tensor import (
+    cofactor,
+    det,
+    diagonal,
+    dot,
+    inner,
+    mat,
+    mlin,
+    mm,
+    mmt,
+    put_mat,
+    transpose,
+)
 
 
 class DeformBars(NamedTuple):
@@ -64,7 +78,13 @@ def fluid(step, bars, law):
 
 def elastic(step, bars, law):
     """Adjoint of `deform.elastic`."""
-    _elastic(step, bars, law, _like(step.L))
+    like = _like(step.L)
+    (_elastic_of_polar if has_polar(law, len(like)) else _elastic)(step, bars, law, like)
+
+
+def has_polar(law, d):
+    """Return whether `elastic_vjp_of_polar` is for the law in d dimensions."""
+    return d == 3 and type(law) in kirchhoff_vjp_of_polar.methods
 
 
 def plastic(step, bars, law, flow):
@@ -103,6 +123,23 @@ def elastic_vjp(step, bars, law, like, c):
         T = within(U, mat(bars.tau, p, like), U)
         X = stress_vjp(s, T, law, step.sums, c)
         put_trial_bar(step, bars, p, mlin(1.0, mat(bars.F, p, like), 1.0, back(U, X, V)), like)
+
+
+@kernel
+def elastic_vjp_of_polar(step, bars, law, like, c):
+    """`elastic_vjp` in 3D for laws that have `kirchhoff_vjp_of_polar`: without singular values,
+    where F is neither close to singular nor inverted.
+    """
+    start, stop = chunk(c, len(step.F))
+    for p in range(start, stop):
+        F, tau_bar = trial(step, p, like), mat(bars.tau, p, like)
+        R, ok = rotation_without_svd(F)
+        if ok:
+            F_bar = stress_vjp_of_polar(F, R, tau_bar, law, (step.sums, c))
+        else:
+            U, s, V, _ = svd(F)
+            F_bar = back(U, stress_vjp(s, within(U, tau_bar, U), law, step.sums, c), V)
+        put_trial_bar(step, bars, p, mlin(1.0, mat(bars.F, p, like), 1.0, F_bar), like)
 
 
 @kernel
@@ -181,6 +218,15 @@ def stress_vjp(s, T, law, sums, c):
 
 
 @kernel
+def stress_vjp_of_polar(F, R, tau_bar, law, row):
+    """F_bar of tau_bar at F with the rotation R; the bars of the moduli join row = (sums, c)."""
+    (sums, c), V, alone = row, mmt(R, F), units(law)
+    for k in range(len(alone)):
+        sums[c, k] += inner(tau_bar, kirchhoff_of_stretch(F, V, alone[k]))
+    return kirchhoff_vjp_of_polar(F, (V, R), tau_bar, law)
+
+
+@kernel
 def pressure_vjp(J, tau_bar, law, sums, c):
     """J_bar; the bars of the moduli join the sums of chunk c."""
     alone = units(law)
@@ -224,6 +270,12 @@ def _fluid(step, bars, law, like):
 def _elastic(step, bars, law, like):
     for c in prange(CHUNKS):
         elastic_vjp(step, bars, law, like, c)
+
+
+@parallel
+def _elastic_of_polar(step, bars, law, like):
+    for c in prange(CHUNKS):
+        elastic_vjp_of_polar(step, bars, law, like, c)
 
 
 @parallel

@@ -6,8 +6,8 @@ scattered anew, conditions tested at the level's own nodes, and the blocks
 
     H_ij = m_i delta_ij I + sum_p dw_ip . C_p . dw_jp
 
-summed over all particles with the differentials C_p of the finest level. A node's coarser
-neighbours carry mass if it does: what reaches the node reaches them.
+summed over all particles with the differentials C_p of the finest level, without friction. A
+node's coarser neighbours carry mass if it does: what reaches the node reaches them.
 """
 
 from dataclasses import replace
@@ -28,6 +28,7 @@ class CoarseGrid(NamedTuple):
     points: tuple
     order: tuple            # of arrays (N,)
     pattern: Pattern
+    stencil: tuple
 
 
 class CoarseGrids:
@@ -69,7 +70,8 @@ def coarse_grid(potential, unknowns):
     points = tuple(quadrature_points(body, box, stencil) for body in potential.bodies)
     order = tuple(point_permutation(body, (potential.box, box), stencil)
                   for body in potential.bodies)
-    return CoarseGrid(unknowns, points, order, pattern_of(unknowns.number, len(stencil) - 1))
+    pattern = pattern_of(unknowns.number, len(stencil) - 1)
+    return CoarseGrid(unknowns, points, order, pattern, stencil)
 
 
 def point_permutation(body, boxes, stencil):
@@ -85,7 +87,8 @@ def coarse_matrix(grid, modes):
     sorted_modes = (StressModes(*(a[order] for a in of_body))
                     for of_body, order in zip(modes, grid.order))
     bodies = tuple(zip(grid.points, sorted_modes))
-    return constrained(assembled(bodies, grid.unknowns, grid.pattern), grid.unknowns.B)
+    H = assembled(bodies, grid.unknowns, grid.pattern, grid.stencil)
+    return constrained(H, grid.unknowns.B)
 
 
 def coarse_conditions(conditions, factor):
