@@ -1,0 +1,27 @@
+"""Every shipped scene runs with explicit and with implicit steps."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from mpm_ref.scene import build, load
+from mpm_ref.simulate import simulate
+
+SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
+STEPS = 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", ["explicit", "hot-plus"])
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_shipped_scene_runs(path, integrator):
+    scene = load(path)
+    solver = None if integrator == "explicit" else scene.solver
+    problem = build(msgspec.structs.replace(scene, integrator=integrator, solver=solver))
+    clock = replace(problem.clock, steps=STEPS, end=None, every=1, interval=None)
+    for frame in simulate(replace(problem, clock=clock, allow_unstable=integrator == "explicit")):
+        state = frame.state
+    assert state.step == STEPS
+    assert integrator == "explicit" or state.solve.converged
