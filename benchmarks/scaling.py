@@ -67,6 +67,7 @@ def shares(repeats):
     for _ in range(repeats + 1):
         for threads, times in found.items():
             jit.set_threads(threads)
+            run.step()                          # wakes the threads
             times.append(phases(run))
     scale = 1e9 / len(run.bodies[0].id)
     one, two = (scale * np.median(times[1:], axis=0) for times in found.values())

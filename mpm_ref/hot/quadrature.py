@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..core.law import intact
-from ..core.order import by_cell, slab_width
+from ..core.order import by_cell, slab_width, without_last_empty
 from ..core.stencil import locate
 from ..core.tensor import diag, mat, put_mat, put_vec, vec
 
@@ -41,7 +41,7 @@ def quadrature_points(body, grid, stencil):
     _fill_points_all(body.particles, grid, stencil, order, (base, s, F, V0))
     width = slab_width(stencil)
     slabs = np.arange(-(-grid.m.shape[0] // width) + 1)
-    start = np.searchsorted(base[:, 0] // width, slabs)
+    start = without_last_empty(np.searchsorted(base[:, 0] // width, slabs))
     return QuadraturePoints(base, s, F, V0, start, np.empty(n), np.empty((n, d, d)))
 
 
