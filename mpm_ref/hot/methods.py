@@ -33,6 +33,7 @@ CHOICES = {
     "start": ("gravity", "zero"),
     "balance": ("rigid", "none"),
     "rebuild_when": REBUILD_RULES,
+    "return_map": ("lagged", "implicit"),
     "kernel": ("linear", "quadratic"),
     "implementation": ("blocks", "scipy"),
 }
@@ -61,6 +62,8 @@ class SolverOptions:
                                         # within the tolerance alone (see `rigid`)
     window: int = 8                     # pairs of L-BFGS
     rebuild_every: int = 0              # steps after which L-BFGS takes a new Hessian; 0: never
+    return_map: str = "lagged"          # of plastic flow: after the solve (printed), or "implicit",
+                                        # in the potential (see `return_map`)
     creep: float = 1e-4                 # sliding in a step [dx] below which friction is not full
     rebuild_when: str = "never"         # also where a step was "shortened", or shows it "stale"
     max_iterations: int = 10000         # outer (the release)
@@ -98,6 +101,9 @@ class SolverOptions:
         if self.descent == "admm" and (self.inverse, self.operator) != ("jacobi", "matrix"):
             raise ValueError('descent = "admm" has its own matrix: expected inverse = "jacobi" '
                              'and operator = "matrix"')
+        if self.descent == "admm" and self.return_map == "implicit":
+            raise ValueError("return_map = 'implicit' with the method 'admm', which splits an "
+                             "elastic energy: expected another method, such as 'hot-plus'")
         if self.operator == "matrix-free" and self.inverse in ("cycle", "sgs", "geometric"):
             raise ValueError(f"inverse = {self.inverse!r} needs a matrix: expected operator = "
                              '"matrix", or inverse = "jacobi" or "cg"')

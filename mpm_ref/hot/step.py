@@ -21,6 +21,7 @@ from .multigrid.geometric import CoarseGrids, coarse_conditions
 from .norms import characteristic_norms
 from .potential import Potential
 from .report import combined_report
+from .return_map import check_return_map
 from .system import System, Unknowns, free_part, unknowns_of
 
 MAX_UPDATES = 20      # of the active set and loads; after that, nodes stay as they are
@@ -57,10 +58,11 @@ class ImplicitStepper(Stepper):
 
     def start(self, bodies):
         """Prepare the bodies, as `explicit.Stepper.start`. Raises ValueError for body forces of
-        particles.
+        particles, and for a flow without potential where the options ask for one.
         """
         super().start(bodies)
         for body in bodies:
+            check_return_map(body, self.options.return_map)
             if body.particles.b.ndim == 2:
                 raise ValueError(f"body {body.name!r} has body forces b of its own: expected "
                                  "gravity alone with an implicit integrator")
@@ -92,7 +94,7 @@ class ImplicitStepper(Stepper):
         grid = scatter(bodies, self.storage, self.scheme, 0.0)
         unknowns, active_set = self._constrained(grid, self.conditions, t, dt)
         stencil = potential_stencil(self.scheme)
-        potential = Potential(bodies, unknowns, stencil, dt, self.gravity)
+        potential = Potential(bodies, unknowns, stencil, dt, self.gravity, self.options.return_map)
         if active_set is not None:
             impulse = first_impulse(unknowns, dt * self.gravity)
             potential = potential.with_friction(self._friction(active_set, potential, impulse))

@@ -177,6 +177,9 @@ def check_implicit(problem):
     if problem.conditions is not None and any(part.friction for part in problem.conditions.rules):
         raise ValueError("friction with an implicit integrator: its plain twin has none; expected "
                          "a scene without, or integrator = \"explicit\"")
+    if problem.solver is not None and problem.solver.return_map == "implicit":
+        raise ValueError("return_map = 'implicit': the plain twin of implicit steps lags it; "
+                         "expected 'lagged'")
     if problem.scheme.mass_eps:
         raise ValueError(f"mass_eps = {problem.scheme.mass_eps} with an implicit integrator: its "
                          "plain twin has none; expected 0")

@@ -317,6 +317,7 @@ class Solver(Record):
     displacement_tolerance: NotNegative | None = None       # error of a step [dx]
     start: Literal["gravity", "zero"] | None = None         # of the increment
     balance: Literal["rigid", "none"] | None = None         # of rigid motions
+    return_map: Literal["lagged", "implicit"] | None = None     # of plastic flow
     creep: Positive | None = None               # sliding in a step, friction is not full below [dx]
     window: Natural | None = None               # pairs of L-BFGS
     rebuild_every: Natural | None = None        # steps between Hessians of L-BFGS
