@@ -17,6 +17,7 @@ FLOORS = (
     ("core.kernel_cache", "core.precision", "core.blas"),
     ("core.jit",),
     ("core.tensor", "core.gimp", "core.block_table", "core.packing"),
+    ("core.mls_slopes",),
     ("core.law", "core.spectral core.deflation core.scaling", "core.logarithm", "core.spline",
      "core.solids"),
     ("core.stencil", "core.state", "core.lines", "core.islands"),
