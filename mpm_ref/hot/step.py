@@ -214,7 +214,7 @@ def write_velocities(grid, unknowns, v):
 
 def check_friction(conditions, options):
     """Raise ValueError for friction with a method that has no place for it."""
-    rubs = conditions is not None and any(part.friction for part in conditions.rules)
+    rubs = any(part.friction for part in getattr(conditions, "rules", ()))
     if rubs and options.descent == "admm":
         raise ValueError("friction with the method 'admm': its splitting knows inertia and "
                          "elasticity alone; expected another method, such as 'hot-plus'")
