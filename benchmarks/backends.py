@@ -37,7 +37,8 @@ class RemoteBackend:
     def __init__(self, name, problem, threads):
         context = get_context("spawn")
         self.pipe, end = context.Pipe()
-        self.process = context.Process(target=serve, args=(end, name, problem, threads))
+        self.process = context.Process(target=serve, args=(end, name, problem, threads),
+                                       daemon=True)
         self.process.start()
         end.close()
 

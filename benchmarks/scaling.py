@@ -26,6 +26,7 @@ MLS = Variant("MLS, quadratic, fixed corotated")
 def sizes(repeats):
     """Return a row per block and form of the loops: median wall and CPU us per step."""
     rows, before = [], jit.few_items
+    jit.set_threads(2)
     for cells in SMALL:
         run = Run(MLS, block(cells))
         particles = len(run.bodies[0].id)

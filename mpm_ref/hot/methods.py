@@ -22,8 +22,7 @@ from .report import ProfiledSystem, Profiler, Solution
 
 RULES, CYCLE = LineSearchOptions(), CycleOptions()
 PRINTED = {"start": "zero", "balance": "none"}      # where HOT as printed is not our default
-RELEASED = {"start": "gravity", "balance": "none", "window": 8,     # of the authors' public code
-            "cycle": CYCLE._replace(stop="load")}
+RELEASED = {"start": "gravity", "balance": "none", "window": 8}     # of the authors' public code
 BALANCES = 5        # rounds of a method and a balance of rigid motions, at most
 CHOICES = {
     "descent": ("lbfgs", "newton", "admm"),
@@ -146,14 +145,15 @@ def printed(method, **changes):
 
 def released(method, **changes):
     """Return the `SolverOptions` of a method by its name as the authors' public code has them, with
-    changes: `RELEASED`, that is the start g dt, no balance, and a coarsest level that is solved
-    relative to the right-hand side of the cycle.
+    changes: `RELEASED`, that is the start g dt, no balance, a window of 8; and CG of the coarsest
+    level is relative to the right-hand side of the cycle.
 
     Two things are not repeated: that code adds the last accepted step once more at the end of a
     solve, and lets the unit rows of fixed nodes enter the coarser matrices. Raises ValueError for
     unknown names.
     """
-    return options_of(method, **{**RELEASED, **changes})
+    options = options_of(method, **{**RELEASED, **changes})
+    return replace(options, cycle=options.cycle._replace(stop="load"))
 
 
 def solve(system, options, stop, profiler):

@@ -95,6 +95,12 @@ class Potential:
         self.add_friction(dv, g)
         return E, g
 
+    def dissipated(self, dv):
+        """Return the dissipation D [J] of the friction at dv, 0 where there is none."""
+        if self.friction is None:
+            return 0.0
+        return friction.energy(self.friction, self.unknowns.v + dv)
+
     def add_friction(self, dv, g):
         """Add dD/du (n, d) [kg m/s] of the friction, where there is some, to g."""
         if self.friction is not None:
@@ -150,9 +156,7 @@ class Potential:
         for body, points in zip(self.bodies, self.points):
             update_response(points, body.law, self.dt)
             E += total(points.psi)
-        if self.friction is not None:
-            E += friction.energy(self.friction, u)
-        return float(E)
+        return float(E) + self.dissipated(dv)
 
 
 def box_of(unknowns):

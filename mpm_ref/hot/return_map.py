@@ -41,3 +41,7 @@ def check_return_map(body, return_map):
         raise ValueError(f"body {body.name!r}: {type(body.flow).__name__} on "
                          f"{type(body.law).__name__} with return_map = 'implicit': expected von "
                          "Mises flow on 'hencky', which has a potential, or return_map = 'lagged'")
+    if body.flow.s_min > 0.0:
+        raise ValueError(f"body {body.name!r}: s_min = {body.flow.s_min} with return_map = "
+                         "'implicit', whose potential lifts no stretches: expected s_min = 0, or "
+                         "return_map = 'lagged'")

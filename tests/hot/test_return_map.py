@@ -131,5 +131,7 @@ def test_what_has_no_potential_is_refused():
             stepper.start([body])
     with pytest.raises(ValueError, match="'admm', which splits an elastic energy"):
         SolverOptions("admm", "admm", inverse="jacobi", return_map="implicit")
-    elastic = q.bodies[0]._replace(flow=NoFlow())
-    assert elastic.flow == NoFlow()
+    lifted = q.bodies[0]._replace(flow=VonMises(1.0, 0.05))
+    with pytest.raises(ValueError, match=r"s_min = 0.05 with return_map = 'implicit'"):
+        stepper.start([lifted])
+    stepper.start([q.bodies[0]._replace(flow=NoFlow())])
