@@ -14,7 +14,7 @@ from math import inf
 
 import numpy as np
 
-from .core.body_contact import BodyPoints, Terms, apply_contact, glue, shares_near
+from .core.body_contact import BodyPoints, ContactTerms, apply_contact, glue, shares_near
 from .core.crowded_nodes import FieldRules, meetings, settle_crowd
 from .core.grid import Storage, update
 from .explicit import Stepper, scatter
@@ -157,7 +157,7 @@ class ContactStepper(Stepper):
                 glue(grids[a], grids[b], nodes)
             else:
                 sides = [(grids[k], shares[k]) for k in (a, b)]
-                apply_contact(*sides, nodes, Terms(float(rules.mu[a, b]), dt, self.dx))
+                apply_contact(*sides, nodes, ContactTerms(float(rules.mu[a, b]), dt, self.dx))
         if len(crowd.node):
             settle_crowd(grids, crowd, shares, rules, dt)
 

@@ -79,7 +79,7 @@ class Side(NamedTuple):
     G: np.ndarray           # (K, d)
 
 
-class Terms(NamedTuple):
+class ContactTerms(NamedTuple):
     """Numbers of the contact of two bodies in a step."""
 
     mu: float               # coefficient of friction
@@ -102,7 +102,7 @@ def glue(a, b, nodes):
 
 
 def apply_contact(one, two, nodes, terms):
-    """Change the velocities of two fields at `Shared` nodes by contact on some `Terms`.
+    """Change the velocities of two fields at `Shared` nodes by contact on some `ContactTerms`.
 
     one and two are pairs of a grid and the `VolumeShare` of its body near these nodes, or more.
     """

@@ -13,7 +13,7 @@ tangential part of at most mu times the rest. Space that a third body fills is n
     g = 2 (1 - sum_k phi_k)/|G_2 - G_1|,    over all bodies k of the node
 
 Near-parallel normals and light fields between heavy ones let sweeps converge slowly. So each one is
-followed by a step on, along the direction of the steps before, with its length and its restarts by
+preceded by a step on, along the direction of the steps before, with its length and its restarts by
 the rule of conjugate gradients [Silcowitz2010]. Sweeps end where none would change a velocity
 between two groups by more than CLOSE of the largest one before contact, and after SWEEPS at the
 latest; large friction can make them go in circles. Impulses are opposite and act at one point:
@@ -265,17 +265,18 @@ def settle_crowded(crowd, state, pairs, dt, like, bounds):
 @kernel
 def solve(state, pairs, bounds, step, like):
     """Find the impulses of the pairs bounds[0] .. bounds[1] - 1 of a node; step is the length of
-    the time step [s], and whether steps on follow the sweeps.
+    the time step [s], and whether there are steps on between sweeps.
     """
-    fastest, last, (dt, goes_on) = 0.0, 0.0, step
+    fastest, last, part, (dt, goes_on) = 0.0, 0.0, 0.0, step
     for p in range(bounds[0], bounds[1]):
         fastest = max(fastest, norm(between(state, pairs, p, like)))
     for _ in range(SWEEPS):
+        if goes_on:
+            step_on(state, pairs, bounds, part, like)
         change, size = sweep(state, pairs, bounds, dt, like)
         if not change > CLOSE * fastest:
             return
-        if goes_on:
-            step_on(state, pairs, bounds, size / last if size < last else 0.0, like)
+        part = size / last if size < last else 0.0
         last = size
 
 
@@ -322,15 +323,10 @@ def sweep(state, pairs, bounds, dt, like):
 
 @kernel
 def step_on(state, pairs, bounds, part, like):
-    """Go on from a sweep by a part of the direction of the steps before, as far as impulses may,
-    and bend this direction by the sweep.
-    """
+    """Go on from a sweep by a part of the direction of the steps before, which the sweep bends."""
     for p in range(bounds[0], bounds[1]):
-        n, l, ahead = vec(pairs.n, p, like), vec(pairs.l, p, like), vec(pairs.ahead, p, like)
-        if part > 0.0:
-            farther = lin(1.0, l, part, ahead)
-            allowed = impulse(farther, n, dot(n, farther), pairs.mu[p])
-            give(state, pairs, p, lin(1.0, allowed, -1.0, l), like)
+        ahead = vec(pairs.ahead, p, like)
+        give(state, pairs, p, lin(part, ahead, 0.0, ahead), like)
         put_vec(pairs.ahead, p, lin(part, ahead, 1.0, vec(pairs.dl, p, like)))
 
 

@@ -8,7 +8,7 @@ by at most mu times that.
 
 Fields that are glued to each other, directly or through others, move as one. Where more than two
 fields reach a node, each pair in turn gives back its impulse and takes the one that the velocities
-now ask for, until none changes. Between two rounds all go on in the direction of the steps before,
+now ask for, until none changes. Before each round all go on in the direction of the steps before,
 by the rule of conjugate gradients [Silcowitz2010].
 """
 
@@ -116,46 +116,33 @@ def groups_of(fields, friction):
 def settled_velocities(m, v, pairs, goes_on):
     """Return the velocities (d,) of groups of masses m and velocities v after all contacts: pairs
     are ((a, b), (n, gap_speed, mu)) of the groups a and b, see `velocities_after`; goes_on: whether
-    steps on follow the rounds.
+    there are steps on between rounds.
     """
     u, fastest = list(v), max((length(v[a] - v[b]) for (a, b), _ in pairs), default=0)
-    impulse, ahead, last = [0 * v[0] for _ in pairs], [0 * v[0] for _ in pairs], 0
+    inverse = [1 / m[a] + 1 / m[b] for (a, b), _ in pairs]
+    impulse, change, ahead = ([0 * v[0] for _ in pairs] for _ in range(3))
+    last = part = 0
 
     def give(j, dl):
         a, b = pairs[j][0]
         impulse[j], u[a], u[b] = impulse[j] + dl, u[a] - dl / m[a], u[b] + dl / m[b]
-        return dl
 
     for _ in range(SWEEPS):
-        changes = []
+        if goes_on:
+            for j in range(len(pairs)):
+                give(j, part * ahead[j])
+                ahead[j] = part * ahead[j] + change[j]
         for j, ((a, b), law) in enumerate(pairs):
             without = u[a] + impulse[j] / m[a], u[b] - impulse[j] / m[b]
             w, _ = velocities_after((m[a], m[b]), without, *law)
-            changes.append(give(j, m[a] * (without[0] - w) - impulse[j]))
-        inverse = [1 / m[a] + 1 / m[b] for (a, b), _ in pairs]
-        if not max((length(dl) * share for dl, share in zip(changes, inverse, strict=True)),
-                   default=0) > CLOSE * fastest:
+            change[j] = m[a] * (without[0] - w) - impulse[j]
+            give(j, change[j])
+        both = list(zip(change, inverse, strict=True))
+        if not max((length(dl) * share for dl, share in both), default=0) > CLOSE * fastest:
             break
-        size = sum(dl @ dl * share for dl, share in zip(changes, inverse, strict=True))
-        part = size / last if goes_on and size < last else 0
-        for j, (_, (n, _, mu)) in enumerate(pairs):
-            farther = impulse[j] + part * ahead[j]
-            give(j, allowed_impulse(farther, n, mu) - impulse[j])
-            ahead[j] = part * ahead[j] + changes[j]
-        last = size
+        size = sum(dl @ dl * share for dl, share in both)
+        part, last = size / last if size < last else 0, size
     return u
-
-
-def allowed_impulse(l, n, mu):
-    """Return an impulse (d,) without what contact forbids: a pull, and friction of more than mu
-    times the push.
-    """
-    push = n @ l
-    if not push > 0:
-        return 0 * l
-    t = l - push * n
-    size, most = length(t), mu * push
-    return push * n + (t * (most / size) if size > most else t)
 
 
 def energy_between(m, v):

@@ -9,8 +9,8 @@ from mpm_ref.body import particles_at
 from mpm_ref.core.body_contact import (
     LEAST_SLOPE,
     BodyPoints,
+    ContactTerms,
     Side,
-    Terms,
     apply_contact,
     glue,
     normal_and_gap,
@@ -76,7 +76,7 @@ def touched(fields, mu=MU, stencil=STENCILS[2]):
     nodes = shared_nodes(*after)
     sides = [(grid, shares_near(at, cloud(q), grid, stencil))
              for grid, q, at in zip(after, fields, nodes, strict=True)]
-    apply_contact(*sides, nodes, Terms(mu, DT, DX))
+    apply_contact(*sides, nodes, ContactTerms(mu, DT, DX))
     return before, after, nodes
 
 
@@ -177,11 +177,36 @@ def test_a_gap_is_measured_at_the_nodes_beside_it(width, rng):
     assert gap[near] == pytest.approx(width, abs=0.05)
 
 
-def stacked(rng, d, shift, width):
-    """Two blocks of the same size whose faces are `width` cells apart."""
+@pytest.mark.parametrize(("height", "expected"), [(2.0, 0.0), (1.0, 1 / 44), (0.5, 5 / 16)])
+def test_a_thin_body_seems_farther_away(height, expected, rng):
+    """Flush on a block: space behind it counts as gap, as seen from a node on the face."""
+    fields = stacked(rng, 2, 0.0, 0.0, height)
+    _, gap, x = geometry(fields)
+    face = (np.abs(x[:, 0] / DX - 4.0) < 1.6) & (np.abs(x[:, 1] / DX - 4.0) < 0.1)
+    assert face.sum() > 1
+    assert gap[face] == pytest.approx(expected, abs=1e-9)
+
+
+def test_space_of_a_collider_counts_as_gap(rng):
+    """Two blocks side by side on a floor: from a node on the floor they seem 4/3 cells apart, and
+    one cell above they touch up to a fiftieth.
+    """
+    fields = tuple(q._replace(x=np.ascontiguousarray(q.x[:, ::-1]))
+                   for q in stacked(rng, 2, 0.0, 0.0))
+    _, gap, x = geometry(fields)
+    floor, above = (gap[(np.abs(x[:, 0] / DX - 4.0) < 0.1) & (np.abs(x[:, 1] / DX - y) < 0.1)]
+                    for y in (0.0, 1.0))
+    assert floor == pytest.approx(4 / 3, abs=1e-9)
+    assert above == pytest.approx(4 / 189, abs=1e-9)
+
+
+def stacked(rng, d, shift, width, height=4.0):
+    """Two blocks of the same size whose faces are `width` cells apart, or an upper one of another
+    height.
+    """
     sides = [0.0] * (d - 1), [8.0] * (d - 1)
     lower = box_of_points([*sides[0], 0.0], [*sides[1], 4.0])
-    upper = box_of_points([*sides[0], 4.0], [*sides[1], 8.0])
+    upper = box_of_points([*sides[0], 4.0], [*sides[1], 4.0 + height])
     lower[:, -1] += shift * DX
     upper[:, -1] += (shift + width) * DX
     return matter(rng, lower), matter(rng, upper)
@@ -227,8 +252,8 @@ def test_the_least_slope_is_one_of_a_cell():
 
 def test_loops_count_the_nodes_that_are_shared():
     """Not those of the grid: threads start where there are many of the former."""
-    side = Side(np.zeros(3, np.int64), np.ones(10000), np.ones((10000, 2)), np.zeros(3),
-                np.zeros((3, 2)))
+    side = Side(m=np.ones(10000), v=np.ones((10000, 2)), node=np.zeros(3, np.int64),
+                phi=np.zeros(3), G=np.zeros((3, 2)))
     assert item_count(side) == 3
 
 @pytest.mark.parametrize("cells", [9.0, -9.0, 40.0])
