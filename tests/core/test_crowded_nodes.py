@@ -231,6 +231,36 @@ def test_momentum_is_exact_and_no_node_gains_energy(d, mu, spread, rng):
     assert (after < 0.99 * before).mean() > 0.2
 
 
+def test_nodes_that_would_gain_energy_have_no_friction():
+    """Of many that circle with a friction of 10, a few; these have the solution without."""
+    drawn = random_nodes(np.random.default_rng(1), 6, 3)
+    state, pairs, _ = solution(*drawn, rules(6, mu=10.0))
+    other, _, ready = solution(*drawn, rules(6))
+    guarded = (pairs.mu == 0.0).reshape(NODES, -1).all(axis=1) & ready
+    assert 0 < guarded.sum() < 0.02 * NODES
+    u, expected = (s.u.reshape(NODES, 6, 3)[guarded] for s in (state, other))
+    assert u == pytest.approx(expected, abs=1e-8)
+
+
+def test_without_friction_each_sweep_lowers_the_energy(rng):
+    """From before contact on, however far from convergence; so a guarded node cannot gain any."""
+    m, v, shares = random_nodes(rng, 5, 2, 3.0)
+    state, pairs, _ = solution(m, v, shares, rules(5))
+    state.u[:], pairs.l[:] = state.v, 0.0
+    m = np.repeat(1.0, 2) * state.M[:, None]
+    start = before = (m * state.v**2).reshape(NODES, -1).sum(axis=1)
+    for _ in range(20):
+        for k in range(NODES):
+            sweep(state, pairs, (pairs.start[k], pairs.start[k + 1]), DT, (0, 1))
+        load = (pairs.n * pairs.l).sum(axis=1) * np.maximum(pairs.gap, 0.0) / DT
+        after = (m * state.u**2).reshape(NODES, -1).sum(axis=1)
+        lower = after + 2.0 * load.reshape(NODES, -1).sum(axis=1)
+        assert (lower <= before * (1.0 + 1e-12)).all()
+        assert (after <= start * (1.0 + 1e-12)).all()
+        before = lower
+    assert (after < 0.9 * start).mean() > 0.2
+
+
 def test_one_and_two_threads_give_the_same_bits(rng):
     m, v, shares = random_nodes(rng, 4, 3)
     one, two = by_threads(lambda: settled(m, v, shares, rules(4, mu=0.3)).tobytes())
