@@ -238,8 +238,8 @@ def stick(one, two, like, bounds):
     """Give both sides their common velocity at the nodes bounds[0] .. bounds[1] - 1."""
     for k in range(bounds[0], bounds[1]):
         i, j = one.node[k], two.node[k]
-        part = one.m[i] / (one.m[i] + two.m[j])
-        v = lin(part, vec(one.v, i, like), 1.0 - part, vec(two.v, j, like))
+        weight = one.m[i] / (one.m[i] + two.m[j])
+        v = lin(weight, vec(one.v, i, like), 1.0 - weight, vec(two.v, j, like))
         put_vec(one.v, i, v)
         put_vec(two.v, j, v)
 

@@ -29,9 +29,9 @@ def volume_share(V, ip, box, dx):
 
     V (N,) [m^d] is the volume of the particles as they are; arrays over the `NodeBox` box.
     """
-    share = V / dx ** ip.node.shape[-1]
-    return (sum_to_nodes(ip.w * share[:, None], ip, box),
-            sum_to_nodes(-ip.dw * share[:, None, None], ip, box))
+    cells = V / dx ** ip.node.shape[-1]
+    return (sum_to_nodes(ip.w * cells[:, None], ip, box),
+            sum_to_nodes(-ip.dw * cells[:, None, None], ip, box))
 
 
 def normal_and_gap(G, empty, dx):
@@ -99,7 +99,7 @@ def velocities_of_fields(matter, empty, friction, step):
             pairs.append(((number[a], number[b]), (n, gap / dt, friction[a, b])))
     u = settled_velocities(m, v, pairs, True)
     if energy_between(m, u) > (1 + ROUNDING) * energy_between(m, v):
-        u = settled_velocities(m, v, [(ends, (*law[:2], 0)) for ends, law in pairs], False)
+        u = settled_velocities(m, v, [(ends, (*terms[:2], 0)) for ends, terms in pairs], False)
     return {k: u[number[k]] for k in matter}
 
 
@@ -132,15 +132,15 @@ def settled_velocities(m, v, pairs, goes_on):
             for j in range(len(pairs)):
                 give(j, part * ahead[j])
                 ahead[j] = part * ahead[j] + change[j]
-        for j, ((a, b), law) in enumerate(pairs):
+        for j, ((a, b), terms) in enumerate(pairs):
             without = u[a] + impulse[j] / m[a], u[b] - impulse[j] / m[b]
-            w, _ = velocities_after((m[a], m[b]), without, *law)
+            w, _ = velocities_after((m[a], m[b]), without, *terms)
             change[j] = m[a] * (without[0] - w) - impulse[j]
             give(j, change[j])
         both = list(zip(change, inverse, strict=True))
-        if not max((length(dl) * share for dl, share in both), default=0) > CLOSE * fastest:
+        if not max((length(dl) * over_m for dl, over_m in both), default=0) > CLOSE * fastest:
             break
-        size = sum(dl @ dl * share for dl, share in both)
+        size = sum(dl @ dl * over_m for dl, over_m in both)
         part, last = size / last if size < last else 0, size
     return u
 
