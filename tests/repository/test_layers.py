@@ -29,7 +29,7 @@ FLOORS = (
      "core.adjoint.grid", "core.adjoint.deform"),
     ("core.mass_nodes",),
     ("core.boundary",),
-    ("core.adjoint.boundary", "core.surface", "core.body_contact"),
+    ("core.adjoint.boundary", "core.surface", "core.body_contact core.crowded_nodes"),
     ("core core.adjoint",),
     ("materials", "plain", "store.atomic"),
     ("body", "store.atomic", "store.weights_file", "store.memmap"),
