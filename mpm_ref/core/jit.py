@@ -17,6 +17,7 @@ Every option and its reason:
 * Waiting OpenMP threads spin for about 0.1 ms, then sleep. Without the spin, the threads of a small
   step sleep and wake several times; spinning for longer made steps of small scenes 8 times slower
   on a machine that does other work too. Set GOMP_SPINCOUNT or OMP_WAIT_POLICY to choose otherwise.
+  The spin is that of GNU's library alone.
 * ``pipeline_class``: kernels of single arguments compute in single precision (`precision`).
 * ``no_cfunc_wrapper``: no kernel is handed to C, and the wrapper for that takes time to compile.
 * Parallel loops run over a fixed number of chunks, never over "one chunk per thread": a result is a
