@@ -171,7 +171,7 @@ def pendulum(run, dx):
 
 
 @experiment("verification.implicit_friction", title="Coulomb friction in implicit steps",
-            profiles=("quick", "standard"), budget={"quick": 60, "standard": 400})
+            profiles=("quick", "standard"), budget={"quick": 30, "standard": 240})
 def implicit_friction(run):
     """Record slides and sticking on two planes, the bowl, and a block that is dragged."""
     dx = run.choose(quick=0.05, standard=0.025)
