@@ -8,7 +8,8 @@ scenes. There a body from a mesh has the mesh's vertices as particles before tho
 each has the volume dx^3/per_cell: bodies whose mesh is fine against the grid are heavier than their
 volume, the armadillo 2.2 times. The trampoline, whose volume a formula gives, shares that volume
 among all its particles. All this is done `as_released`; otherwise vertices are no particles, and
-particles share the mesh's volume.
+particles share the mesh's volume. In either case bodies overlap as they do in the release, and the
+wheel reaches into its floor.
 """
 
 from pathlib import Path
@@ -154,12 +155,12 @@ def main(folder: Annotated[Path, typer.Argument(help="for scenes and particles")
             raise typer.BadParameter(f"{name}: {reason}")
         scene = real_scene(name, sized(f"hot_{name}", "paper"), folder, as_released)
         file = folder / f"hot_{name}.toml"
-        file.write_text(f"# {bodies_text(name)}\n{dumps(beside_particles(scene))}",
+        file.write_text(f"# {bodies_text(name)}\n{dumps(with_local_files(scene))}",
                         encoding="utf-8")
         typer.echo(f"wrote {file}")
 
 
-def beside_particles(scene):
+def with_local_files(scene):
     """Return a scene whose files of particles lie in its own folder."""
     return with_(scene, body=tuple(
         body if body.particles is None
