@@ -44,11 +44,11 @@ def cost(name, threads, seconds, method, most):
     set_threads(threads)
     with threadpoolctl.threadpool_limits(threads):
         short = Path(name).stem.removeprefix("hot_")
-        made(first_state(sized(f"hot_{short}", "quick"), method), 600, 3)       # compiles
+        step_costs(first_state(sized(f"hot_{short}", "quick"), method), 600, 3)       # compiles
         begun = time.perf_counter()
         run = first_state(printed_scene(name), method)
         built = time.perf_counter() - begun
-        steps = made(run, seconds, most)
+        steps = step_costs(run, seconds, most)
     iterations, wall, cpu = np.transpose(steps)
     problem, _, state = run
     return {"scene": Path(name).stem, "method": method, "threads": threads,
@@ -73,7 +73,7 @@ def first_state(scene, method):
     return problem, stepper, state
 
 
-def made(run, seconds, most):
+def step_costs(run, seconds, most):
     """Make steps and return (iterations, wall s, CPU s) of each."""
     problem, stepper, state = run
     rows, begun = [], time.perf_counter()
