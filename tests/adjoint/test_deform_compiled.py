@@ -8,7 +8,8 @@ from deform_bars import DT, apart, materials, named, seeds, states
 from problems import run_python
 from threads import MOST, by_threads
 
-from mpm_ref.core.adjoint import deform
+from mpm_ref.core.adjoint import corotated, deform
+from mpm_ref.core.corotated import BLOCK
 from mpm_ref.core.jit import CHUNKS
 from mpm_ref.materials import FixedCorotated, NoFlow
 
@@ -42,7 +43,7 @@ def driven(name):
     if q.F.ndim == 1:
         deform.fluid(step, bars, law)
     elif isinstance(flow, NoFlow):
-        deform.elastic(step, bars, law)
+        (corotated if corotated.fits(law, CASES[name]) else deform).elastic(step, bars, law)
     else:
         deform.plastic(step, bars, law, flow)
     return bars, step.sums
@@ -75,20 +76,36 @@ def test_as_the_plain_text(plain, name):
     assert max(apart(named(*driven(name), law, flow), expected).values()) < 1e-13
 
 
-def test_without_singular_values_as_with_them():
+@pytest.mark.parametrize("n", [N, CHUNKS * (BLOCK + 7)], ids=["parts of blocks", "blocks"])
+def test_without_singular_values_as_with_them(n):
     """Far from singular, through rest, and where the loop falls back to singular values."""
     law = FixedCorotated(300.0, 500.0)
     rng = np.random.default_rng(6)
-    s = np.exp(0.3 * rng.standard_normal((N, 3)))
+    s = np.exp(0.3 * rng.standard_normal((n, 3)))
     s[:20], s[20:40, 2], s[40:60] = 1.0, 1e-3, s[40:60] * (1.0, 1.0, -1.0)
-    q = states(rng, s, (law, NoFlow(), False))
+    q = states(rng, rng.permutation(s), (law, NoFlow(), False))
     found = []
-    for run in (deform.elastic_vjp_of_polar, deform.elastic_vjp):
-        bars, step, like = seeds(q, law, NoFlow())
-        for c in range(CHUNKS):
-            run(step, bars, law, like, c)
+    for run in (corotated.elastic, deform.elastic):
+        bars, step, _ = seeds(q, law, NoFlow())
+        run(step, bars, law)
         found.append(named(bars, step.sums, law, NoFlow()))
     assert max(apart(*found).values()) < 1e-13
+
+
+def test_bar_of_a_shared_gradient_joins_that_of_C():
+    """Where L and C are one field."""
+    law, flow, _ = materials(3)["none on fixed_corotated"]
+    q = scattered("none on fixed_corotated")
+    for run in (corotated.elastic, deform.elastic):
+        apart_bars, step, _ = seeds(q, law, flow)
+        joined, again, _ = seeds(q, law, flow)
+        C = np.random.default_rng(7).standard_normal(q.L.shape)
+        joined = joined._replace(L=again.L, C=C.copy())
+        run(step, apart_bars, law)
+        run(again, joined, law)
+        assert np.array_equal(joined.C, C + apart_bars.L)
+        assert np.array_equal(joined.F, apart_bars.F)
+        assert np.array_equal(joined.L, q.L)
 
 
 @pytest.mark.skipif(MOST < 2, reason="one core")

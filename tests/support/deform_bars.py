@@ -13,6 +13,7 @@ from constitutive import LAW, rate, rotations, transpose
 from flows import CASES, setting
 
 from mpm_ref.core import deform
+from mpm_ref.core.adjoint import corotated
 from mpm_ref.core.adjoint import deform as adjoint
 from mpm_ref.core.adjoint.deform import DeformBars, DeformStep
 from mpm_ref.core.jit import CHUNKS
@@ -120,8 +121,8 @@ def gradients(q, law, flow):
         if q.F.ndim == 1:
             adjoint.fluid_vjp(step, bars, law, like, c)
         elif isinstance(flow, NoFlow):
-            polar = adjoint.has_polar(law, len(like))
-            run = adjoint.elastic_vjp_of_polar if polar else adjoint.elastic_vjp
+            by_blocks = corotated.fits(law, len(like))
+            run = corotated.elastic_blocks if by_blocks else adjoint.elastic_vjp
             run(step, bars, law, like, c)
         else:
             adjoint.plastic_vjp(step, bars, law, flow, like, c)
@@ -160,7 +161,7 @@ def at_start(q):
 def seeds(q, law, flow):
     """Bars before an adjoint pass, the step it goes through, and a tuple of length d."""
     w_F, w_tau, w_y = q.weights
-    bars = DeformBars(w_F.copy(), w_tau, np.full_like(q.L, np.nan), w_y.copy())
+    bars = DeformBars(w_F.copy(), w_tau, np.full_like(q.L, np.nan), w_y.copy(), NONE)
     sums = np.zeros((CHUNKS, len(law) + len(flow)))
     return bars, DeformStep(q.F, q.y, q.L, sums, DT), tuple(range(q.L.shape[1]))
 
