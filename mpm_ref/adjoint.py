@@ -18,7 +18,7 @@ from .core.adjoint.grid import Update, update_adjoint
 from .core.adjoint.records import packed_bars, packed_velocities, unpack, zero_records
 from .core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint, velocity_gradients
 from .core.boundary import solve
-from .core.grid import Storage, update
+from .core.grid import GridBox, Storage, update
 from .core.jit import CHUNKS
 from .core.law import kirchhoff_vjp, project_vjp
 from .core.order import slabs_of
@@ -103,7 +103,7 @@ class StepAdjoint:
     def _transfer(self, bodies, bars, step, dt):
         """Pull bars of x, v, C, L after the step back to x, v, C, tau, m, V0, b before it."""
         scheme, (grid, moved, touched) = self.scheme, step
-        nodes = self.storage_of_bars.cover([body.particles.x for body in bodies])
+        nodes = self.storage_of_bars.zeroed(GridBox(grid.origin, grid.m.shape, grid.v.dtype.type))
         how = self._exchange(dt)
         of_moved = zero_records(nodes)
         for body, bar in zip(bodies, bars):

@@ -50,6 +50,8 @@ from .shape_gradient import (
 from .transfer_lines import (
     Advection,
     Motion,
+    OfArms,
+    OfSlopes,
     gather_joined_all,
     gather_separate_all,
     gradients_all,
@@ -231,14 +233,13 @@ def force_bar(f, i, v_i, dt):
 
 def velocity_gradients(x, grid, L, how):
     """Compute L (N, d, d) of g2p for particles at x (N, d), to the bit, from a grid of records."""
-    D_inv = inverse_inertia(grid.dx, how.stencil)
     if not how.mls:
-        form, scales = GradientForm(how.dt), (1.0, 1.0 / grid.dx)
-    elif grid.v_old.ndim > 1 or fits(grid, how.stencil, how.mls):
-        form, scales = MlsForm(how.dt, D_inv), (1.0, grid.dx * D_inv)
+        form = OfSlopes(1.0, 1.0 / grid.dx)
     else:
-        form, scales = MlsForm(how.dt, D_inv), (grid.dx, D_inv)
-    gradients_all(x, grid, L, (how.stencil, form), scales)
+        D_inv = inverse_inertia(grid.dx, how.stencil)
+        at_once = grid.v_old.ndim > 1 or fits(grid, how.stencil, how.mls)
+        form = OfArms(1.0, grid.dx * D_inv) if at_once else OfArms(grid.dx, D_inv)
+    gradients_all(x, grid, L, how.stencil, form)
 
 
 def g2p_adjoint(particles, grid, bars, nodes, how, slabs):

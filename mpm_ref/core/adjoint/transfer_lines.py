@@ -251,6 +251,20 @@ def add_force_bars(particles, bars, p, sums, dx, form):
 
 # the velocity gradient of a step, with the bits of `core.transfer`
 
+class OfSlopes(NamedTuple):
+    """L_p = sum_i v_i dw_ip^T: its sums with slopes in cells, times two scales in turn."""
+
+    first: float
+    second: float
+
+
+class OfArms(NamedTuple):
+    """L_p = D^-1 sum_i w_ip v_i r_ip^T: its sums with arms in cells, times two scales in turn."""
+
+    first: float
+    second: float
+
+
 gradient_factors = by_type("gradient_factors")      # (w, dw, s, form) -> factors of an L by axis
 
 
@@ -264,21 +278,19 @@ def _arms(w, dw, s, form):
     return arms_per_axis(w, s)
 
 
-gradient_factors.method(GradientForm, _slopes)
-gradient_factors.method(MlsForm, _arms)
+gradient_factors.method(OfSlopes, _slopes)
+gradient_factors.method(OfArms, _arms)
 
 
 @kernel
-def gradients(x, grid, L, how, scales, bounds):
-    """L_p = sum_i v_i g_ip^T of particles at x (N, d), with the factors g of a form, times two
-    scales; how = (stencil, form).
-    """
-    v, (stencil, form) = grid.v.reshape(-1), how
+def gradients(x, grid, L, stencil, form, bounds):
+    """The velocity gradients of particles at x (N, d), of a form `OfSlopes` or `OfArms`."""
+    v = grid.v.reshape(-1)
     for p in range(bounds[0], bounds[1]):
         lines, (w, dw, s) = lines_around(vec(x, p, grid.m.shape), grid, stencil)
         g = by_plane(gradient_factors(w, dw, s, form), 0.0)
         sums = matrix_of(gradient_columns(v, g, lines, s), s)
-        put_mat(L, p, scale(scales[1], scale(scales[0], sums)))
+        put_mat(L, p, scale(form.second, scale(form.first, sums)))
 
 
 # the mean velocities of a step
@@ -332,10 +344,10 @@ def gather_separate_all(particles, nodes, bars, stencil, form):
 
 
 @parallel_if_many
-def gradients_all(x, grid, L, how, scales):
+def gradients_all(x, grid, L, stencil, form):
     """`gradients` of all particles, in parallel."""
     for c in prange(CHUNKS):
-        gradients(x, grid, L, how, scales, chunk(c, len(x)))
+        gradients(x, grid, L, stencil, form, chunk(c, len(x)))
 
 
 @parallel_if_many
