@@ -22,6 +22,7 @@ import typer
 
 from validation.common.provenance import commit, cpu_model
 
+from .backends import RemoteBackend, make_backend
 from .problem import block
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
@@ -30,43 +31,20 @@ WARM_UP = 20        # steps before timing, after which the energies are compared
 AGREE = 1e-12       # relative difference of the kinetic energies that is allowed
 
 
-def backend(name, problem, threads):
-    """Return a stepper of the problem; only the requested backend is imported."""
-    if name == "mpm_ref":
-        from .ours_block import OurBlock as Backend
-    elif name == "taichi":
-        from .taichi_block import TaichiBlock as Backend
-    else:
-        from .warp_block import WarpBlock as Backend
-    return Backend(problem, threads)
-
-
-def timed(stepper, steps):
-    """Return the wall and CPU seconds of a number of steps."""
-    wall, cpu = time.perf_counter(), time.process_time()
-    stepper.step(steps)
-    return time.perf_counter() - wall, time.process_time() - cpu
-
-
-def kinetic(stepper, mass):
-    """Return the kinetic energy of the particles [J]."""
-    return 0.5 * mass * float(np.sum(stepper.velocity() ** 2))
-
-
 def compare(problem, names, threads, repeats):
     """Return the median wall and CPU ns per particle-step of each backend, and their energies.
 
     The backends are timed in turn.
     """
-    steppers = {name: backend(name, problem, threads) for name in names}
-    for stepper in steppers.values():
-        stepper.step(WARM_UP)
-    energies = {name: kinetic(stepper, problem.m) for name, stepper in steppers.items()}
+    backends = {name: RemoteBackend(name, problem, threads) for name in names}
+    energies = {name: backend.step(WARM_UP)[2] for name, backend in backends.items()}
     per_round = max(1, round(300_000 / len(problem.x)))
     rounds = {name: [] for name in names}
     for _ in range(repeats):
-        for name, stepper in steppers.items():
-            rounds[name].append(timed(stepper, per_round))
+        for name, backend in backends.items():
+            rounds[name].append(backend.step(per_round)[:2])
+    for backend in backends.values():
+        backend.close()
     scale = 1e9 / (per_round * len(problem.x))
     times = {name: np.median(r, axis=0) * scale for name, r in rounds.items()}
     return times, energies
@@ -141,6 +119,18 @@ def features(
             f"x {row['cpu_ratio']:.2f}  {row['state_bytes_per_particle']:.0f} B"
         )
     save(out, rows, threads, repeats)
+
+
+@app.command()
+def scaling(repeats: int = 9, out: Path = Path("results/benchmarks/scaling.json")):
+    """Measure the fixed cost of a step, and the parallel share of its phases on two threads."""
+    from .scaling import shares, sizes
+
+    rows = sizes(repeats) + shares(repeats)
+    for row in rows:
+        typer.echo("  ".join(f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
+                             for key, value in row.items()))
+    save(out, rows, 2, repeats)
 
 
 @app.command()
@@ -239,7 +229,7 @@ def start(name: str, size: str = "100k", threads: int = 2):
     began = time.perf_counter()
     problem = block(CELLS[size])
     initial = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    stepper = backend(name, problem, threads)
+    stepper = make_backend(name, problem, threads)
     stepper.step(1)
     seconds = time.perf_counter() - began
     stepper.step(WARM_UP)

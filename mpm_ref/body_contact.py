@@ -1,21 +1,26 @@
 """Explicit steps of bodies that touch: a velocity field for each body that has a contact.
 
-    for each field: order -> p2g -> grid update     contact of each pair -> boundaries, g2p, deform
+    for each field: order -> p2g -> grid update     contact -> boundaries, g2p, deform
 
-All bodies without a contact share one field. Fields whose pair has no contact act as one: at each
-common node they get their common velocity (see `core.body_contact` for both rules). Pairs act one
-after the other, in the order of their bodies.
+All bodies without a contact share one field. Fields whose pair has no contact are glued, as fields
+of kind "stick" are: at each common node they get their joint mean velocity. Nodes that two fields
+share have the direct solution of `core.body_contact`; nodes that more of them share that of
+`core.crowded_nodes`, for all pairs at once.
 """
 
 from dataclasses import dataclass
 from itertools import combinations
 from math import inf
 
-from .core.body_contact import BodyPoints, apply_contact, glue, shared_nodes
+import numpy as np
+
+from .core.body_contact import BodyPoints, ContactTerms, apply_contact, glue, shares_near
+from .core.crowded_nodes import FieldRules, meetings, settle_crowd
 from .core.grid import Storage, update
 from .explicit import Stepper, scatter
 
 KINDS = "separate", "stick"
+MOST_PER_CELL = 10      # particles of GIMP per cell and axis: slopes turn within 1/gimp of a cell
 
 
 @dataclass(frozen=True)
@@ -53,7 +58,7 @@ class BodyContact:
 
 def rules_of(contacts, names):
     """Return {pair of names: `BodyContact`} of contacts. Raises ValueError for a name that is not
-    one of `names`, and for a pair that two contacts state.
+    one of `names` or stands there twice, and for a pair that two contacts state.
     """
     rules = {}
     for contact in contacts:
@@ -66,36 +71,55 @@ def rules_of(contacts, names):
                 raise ValueError(f"bodies {' and '.join(map(repr, sorted(pair)))}: two contacts "
                                  "name this pair; expected one")
             rules[pair] = contact
+    for k, name in enumerate(names):
+        if contacts and name in names[:k]:
+            raise ValueError(f"body {name!r}: two bodies have this name; contacts expect one of "
+                             "each")
     return rules
 
 
 def check_contacts(contacts, names, scheme):
     """Raise ValueError for contacts that do not fit the names of bodies, or the scheme."""
     rules_of(contacts, names)
-    if contacts and scheme.precision != "double":
+    if not contacts:
+        return
+    if scheme.precision != "double":
         raise ValueError(f"contact of bodies with precision = {scheme.precision!r}: expected "
                          "'double', which the gap of the bodies needs")
-    if contacts and scheme.degree == 1:
+    if scheme.degree == 1:
         raise ValueError("contact of bodies with degree = 1: expected 2 or 3, whose weights have a "
                          "continuous slope, from which the normal is taken")
+    if scheme.gimp > MOST_PER_CELL:
+        raise ValueError(f"contact of bodies with gimp = {scheme.gimp}: expected at most "
+                         f"{MOST_PER_CELL}, since the normal is taken from slopes that turn within "
+                         "1/gimp of a cell")
+    if scheme.mass_eps:
+        raise ValueError(f"contact of bodies with mass_eps = {scheme.mass_eps}: expected 0, since "
+                         "each field of bodies would add it once more")
 
 
 class ContactStepper(Stepper):
     """A `Stepper` of bodies some of which touch by `BodyContact`.
 
     Its grids are lists, with a `Grid` for each field, which covers the bodies of the field alone.
-    conditions need `apply_all` (see `core.boundary.Conditions`).
+    Raises ValueError for conditions without `apply_all` (see `core.boundary.Conditions`).
     """
 
     def __init__(self, contacts, scheme, dx, gravity, conditions=None):
         super().__init__(scheme, dx, len(gravity), gravity, conditions)
+        if conditions is not None and not hasattr(conditions, "apply_all"):
+            raise ValueError(f"conditions {type(conditions).__name__} with contacts of bodies: "
+                             "expected a method apply_all(grids, t, dt), which applies them to the "
+                             "grids of all fields, such as that of core.boundary.Conditions")
         self.contacts = tuple(contacts)
         self.stores = {}
+        self.rules = None       # `FieldRules`, from `start` on
 
     def start(self, bodies):
         """Start as `Stepper.start`. Raises ValueError for contacts that do not fit the bodies."""
         super().start(bodies)
         check_contacts(self.contacts, [body.name for body in bodies], self.scheme)
+        self.rules = field_rules(self.contacts, self.fields(bodies))
 
     def fields(self, bodies):
         """Return the bodies of each field, a list of lists: those without contact, and each that
@@ -117,7 +141,7 @@ class ContactStepper(Stepper):
                 self.stores[k] = Storage(self.dx, scheme.stencil, len(self.gravity),
                                          flip=scheme.keeps_old_velocity)
             grids.append(scatter(field, self.stores[k], scheme, dt))
-            update(grids[-1], self.gravity, dt, scheme.mass_eps, scheme.gravity_on_empty)
+            update(grids[-1], self.gravity, dt, on_empty=scheme.gravity_on_empty)
         self.touch(self.parts(grids, bodies), dt)
         return grids
 
@@ -125,18 +149,33 @@ class ContactStepper(Stepper):
         """Change the velocities of the grids where their fields touch in a step of dt [s]; parts
         are those of `parts`.
         """
-        names = [body.name for _, field in parts for body in field]
-        rules = rules_of(self.contacts, names)
-        for a, b in combinations(parts, 2):
-            nodes = shared_nodes(a[0], b[0])
-            if not len(nodes.first):
-                continue
-            rule = rules.get(frozenset((a[1][0].name, b[1][0].name)))
-            if rule is None or rule.kind == "stick":
-                glue(a[0], b[0], nodes)
+        grids, rules = [grid for grid, _ in parts], self.rules
+        pairs, crowd = meetings(grids)
+        shares = self.shares(parts, pairs, crowd)
+        for (a, b), nodes in pairs.items():
+            if rules.glued[a, b]:
+                glue(grids[a], grids[b], nodes)
             else:
-                sides = [(grid, points_of(field)) for grid, field in (a, b)]
-                apply_contact(*sides, nodes, (rule.friction, dt), self.scheme.stencil)
+                sides = [(grids[k], shares[k]) for k in (a, b)]
+                apply_contact(*sides, nodes, ContactTerms(float(rules.mu[a, b]), dt, self.dx))
+        if len(crowd.node):
+            settle_crowd(grids, crowd, shares, rules, dt)
+
+    def shares(self, parts, pairs, crowd):
+        """Return {field: `VolumeShare`} of the fields that are not glued to all others, near the
+        nodes of `meetings` at which they may touch.
+        """
+        glued, nodes = self.rules.glued, {}
+        for pair, shared in pairs.items():
+            for field, node in zip(pair, shared, strict=True):
+                if not glued[pair]:
+                    nodes.setdefault(field, []).append(node)
+        for field in np.unique(crowd.field):
+            if not glued[field].all():
+                nodes.setdefault(field, []).append(crowd.node[crowd.field == field])
+        return {field: shares_near(np.concatenate(lists), points_of(*parts[field][1]),
+                                   parts[field][0], self.scheme.stencil)
+                for field, lists in nodes.items()}
 
     def constrain(self, grids, t, dt):
         """Apply the conditions to all grids, in the step from time t [s] by dt [s]."""
@@ -149,6 +188,19 @@ class ContactStepper(Stepper):
             super().update_particles(field, grid, dt)
 
 
-def points_of(bodies):
-    """Return the `BodyPoints` of each body."""
-    return [BodyPoints(q.x, q.V0, q.F) for q in (body.particles for body in bodies)]
+def field_rules(contacts, fields):
+    """Return the `FieldRules` of fields, lists of bodies; bodies of a contact have one each."""
+    rules = rules_of(contacts, [body.name for field in fields for body in field])
+    size = 2 * (len(fields),)
+    glued, mu = np.ones(size, dtype=np.bool_), np.zeros(size)
+    for a, b in combinations(range(len(fields)), 2):
+        contact = rules.get(frozenset((fields[a][0].name, fields[b][0].name)))
+        if contact is not None and contact.kind == "separate":
+            glued[a, b] = glued[b, a] = False
+            mu[a, b] = mu[b, a] = contact.friction
+    return FieldRules(glued, mu)
+
+
+def points_of(body):
+    """Return the `BodyPoints` of a body."""
+    return BodyPoints(body.particles.x, body.particles.V0, body.particles.F)

@@ -1,9 +1,10 @@
-"""Warnings before a run about bodies that start inside a collider or a wall, or overlap.
+"""Warnings before a run about bodies that start inside a collider or a wall, or overlap, or are too
+thin for their contacts.
 
     for sentence in misplaced(problem):
         print(sentence)
 
-Neither is an error: it may be intended. The command line prints them before a run and in `info`.
+None is an error: it may be intended. The command line prints them before a run and in `info`.
 """
 
 import json
@@ -19,17 +20,18 @@ from .monitor import volume_ratio
 ON = 1e-6           # cells: a particle this near to a surface is on it, however it was rounded
 REACH = 2.0         # particle spacings: radius of the ball in which material is measured
 CROWDED = 1.5       # of that ball; bodies that merely touch fill at most 1.3, also if random
+THIN = 2.0          # cells: others sink into a thinner body that they touch
 
 
 def misplaced(problem):
-    """Return sentences about bodies that start inside a collider or a wall, or overlap; usually
-    none.
+    """Return sentences about bodies that start inside a collider or a wall, overlap, or are thin
+    where others touch them; usually none.
 
     The regions of `fixed`, whose nodes have a given motion, may hold particles. Two bodies overlap
     where they have half as much material again as there is room, which is at a depth of one or two
-    particle spacings; less is not detected.
+    particle spacings; less is not detected. Thin is what is flat, not what is hollow.
     """
-    return [*_in_solids(problem), *_in_each_other(problem.bodies)]
+    return [*_in_solids(problem), *_in_each_other(problem.bodies), *_thin(problem)]
 
 
 # in colliders and walls
@@ -135,3 +137,24 @@ def _volume(body):
 
 def _spacing(body):
     return _volume(body) ** (1.0 / body.particles.x.shape[1])
+
+
+# thin bodies in contact
+
+def _thin(problem):
+    """Yield a sentence for each body that others touch by `BodyContact` and is THIN."""
+    touched = {name for contact in problem.contacts if contact.kind == "separate"
+               for name in contact.bodies}
+    for body in problem.bodies:
+        thickness = _thickness(body) / problem.dx if body.name in touched else np.inf
+        if thickness < (1.0 - ON) * THIN:
+            yield (f"body {body.name!r} is {thickness:.3g} dx thick, less than {THIN:g}: contact "
+                   "measures gaps by the space that bodies fill around nodes, so that others sink "
+                   "into it; take a finer grid")
+
+
+def _thickness(body):
+    """Return the smallest extent of a body along the axes of the grid and its own ones [m]."""
+    x = body.particles.x - body.particles.x.mean(axis=0)
+    axes = np.linalg.eigh(np.einsum("pa,pb->ab", x, x))[1]
+    return float(min(np.ptp(x, axis=0).min(), np.ptp(x @ axes, axis=0).min())) + _spacing(body)

@@ -160,7 +160,7 @@ def open_runs(request, observed):
 
         def show(label, observation):
             bar.set_postfix_str(f"{counted(runs.count, 'run')}, {max(runs.left, 0.0):.0f} s left, "
-                                f"last: {label}: {observation.outcome}")
+                                f"last: {getattr(label, 'text', label)}: {observation.outcome}")
             bar.update(request.budget - max(runs.left, 0.0) - bar.n)
 
         runs.on_run = show

@@ -177,12 +177,15 @@ def run_search(record, observed, request, others):
 
 def write_answer(search, facts, request, tables):
     """Write the JSON, the page, the figure, and the recommended scene, with the quantities of
-    interest of the scene as given. Raises `NotWritten`.
+    interest of the scene as given; without one, remove that of an earlier answer. Raises
+    `NotWritten`.
     """
     base = request.out / request.stem
     write_bytes(f"{base}.trade.json", as_json(facts).encode())
     write_bytes(f"{base}.trade.html", page_of(facts, "trade").encode())
     save_figure(facts, f"{base}.trade.png")
     text = best_scene(search, request.stem, request.out, tables, facts["start_fault"])
-    if text is not None:
+    if text is None:
+        Path(f"{base}.best.toml").unlink(missing_ok=True)      # of an earlier answer
+    else:
         write_bytes(f"{base}.best.toml", text.encode())

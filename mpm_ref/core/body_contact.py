@@ -10,15 +10,18 @@ its width times the slope of the shares. So
 
     g = 2 (1 - phi_1 - phi_2)/|G_2 - G_1|
 
-is the width of the gap. In a step of length dt it may close, and no more: with the mass
-m = m_1 m_2/(m_1 + m_2) and the velocity w = v_1 - v_2, body 2 gets from body 1 the impulse
+is the width of the gap. Where |G_2 - G_1| is less than LEAST_SLOPE in a cell, as deep in two bodies
+that lie in each other, round-off would choose n: there is no normal, and nothing acts. In a step of
+length dt the gap may close, and no more: with the mass m = m_1 m_2/(m_1 + m_2) and the velocity
+w = v_1 - v_2, body 2 gets from body 1 the impulse
 
     l n + t,    l = m (n . w - max(g, 0)/dt) where that is positive,
 
 with t along w - (n . w) n, of the size that ends all sliding, but at most mu l, Coulomb's law. The
 impulses on both bodies are opposite and act at one point, so that momentum and its moment are kept;
 none adds energy. Without a gap bodies would act on each other from their first common node on, more
-than half a cell apart [Bardenhagen2001]; [Nairn2013] has other measures of it.
+than half a cell apart [Bardenhagen2001]; [Nairn2013] has other measures of it. Nodes that three
+fields or more share are those of `crowded_nodes`.
 """
 
 from itertools import product as tuples
@@ -40,6 +43,8 @@ from .stencil import (
 )
 from .tensor import det, dot, lin, mat, norm, put_vec, vec
 
+LEAST_SLOPE = 1e-3      # of the shares in a cell, |G_2 - G_1| dx: below it there is no normal
+
 
 class Shared(NamedTuple):
     """Nodes at which two grids have mass, by their index in the flattened arrays of each."""
@@ -57,9 +62,9 @@ class BodyPoints(NamedTuple):
 
 
 class VolumeShare(NamedTuple):
-    """The share of space that a field fills near K nodes."""
+    """The share of space that a body fills near K nodes."""
 
-    slot: np.ndarray        # (n1, .., nd)  which of them a node of the grid is, or -1
+    slot: np.ndarray        # (n1, .., nd)  number of a node of the grid in those, or -1
     phi: np.ndarray         # (K,)          the share of space that it fills
     G: np.ndarray           # (K, d)        the gradient of that share [1/m]
 
@@ -67,11 +72,19 @@ class VolumeShare(NamedTuple):
 class Side(NamedTuple):
     """One of two fields at K nodes."""
 
-    m: np.ndarray           # (n,)    mass of all its nodes [kg]
-    v: np.ndarray           # (n, d)  velocity, which contact changes [m/s]
-    node: np.ndarray        # (K,)    which of them
+    node: np.ndarray        # (K,)    index in the flattened arrays of its grid
+    m: np.ndarray           # (n,)    mass of all nodes of the grid [kg]
+    v: np.ndarray           # (n, d)  their velocity, which contact changes [m/s]
     phi: np.ndarray         # (K,)    see `VolumeShare`
     G: np.ndarray           # (K, d)
+
+
+class ContactTerms(NamedTuple):
+    """Numbers of the contact of two bodies in a step."""
+
+    mu: float               # coefficient of friction
+    dt: float               # length of the step [s]
+    dx: float               # grid spacing [m]
 
 
 # both rules
@@ -83,23 +96,22 @@ def glue(a, b, nodes):
     d = a.m.ndim
     nothing = np.empty(0), np.empty((0, d))
     for name in ("v", "v_old") if a.v_old.ndim > 1 else ("v",):
-        sides = [Side(grid.m.reshape(-1), getattr(grid, name).reshape(-1, d), at, *nothing)
+        sides = [Side(at, grid.m.reshape(-1), getattr(grid, name).reshape(-1, d), *nothing)
                  for grid, at in zip((a, b), nodes, strict=True)]
         _stick_all(*sides, tuple(range(d)))
 
 
-def apply_contact(one, two, nodes, law, stencil):
-    """Change the velocities of two fields at `Shared` nodes by contact.
+def apply_contact(one, two, nodes, terms):
+    """Change the velocities of two fields at `Shared` nodes by contact on some `ContactTerms`.
 
-    one and two are pairs of a grid and the `BodyPoints` of its bodies; law is the coefficient of
-    friction and the length of the step [s].
+    one and two are pairs of a grid and the `VolumeShare` of its body near these nodes, or more.
     """
     sides = []
-    for (grid, bodies), at in zip((one, two), nodes, strict=True):
-        shares = shares_near(at, bodies, grid, stencil)
-        sides.append(Side(grid.m.reshape(-1), grid.v.reshape(-1, grid.m.ndim), at, shares.phi,
-                          shares.G))
-    _separate_all(*sides, law, tuple(range(one[0].m.ndim)))
+    for (grid, shares), at in zip((one, two), nodes, strict=True):
+        k = shares.slot.reshape(-1)[at]
+        sides.append(Side(at, grid.m.reshape(-1), grid.v.reshape(-1, grid.m.ndim), shares.phi[k],
+                          shares.G[k]))
+    _separate_all(*sides, terms, tuple(range(one[0].m.ndim)))
 
 
 # the nodes, and the matter near them
@@ -115,22 +127,20 @@ def shared_nodes(a, b):
     return Shared(*(np.ravel_multi_index(at - g.origin[:, None], g.m.shape) for g in (a, b)))
 
 
-def shares_near(nodes, bodies, grid, stencil):
-    """Return the `VolumeShare` at nodes (K,), indices in a grid's flattened arrays, of the bodies
-    whose grid it is, a list of `BodyPoints`.
+def shares_near(nodes, points, grid, stencil):
+    """Return the `VolumeShare` near nodes (K,), indices in a grid's flattened arrays, of the body
+    whose grid it is, with some `BodyPoints`.
     """
     d = grid.m.ndim
     shares = VolumeShare(np.full(grid.m.shape, -1), np.zeros(len(nodes)),
                          np.zeros((len(nodes), d)))
     shares.slot.reshape(-1)[nodes] = np.arange(len(nodes))
-    bases = bases_of(nodes, grid.m.shape, stencil)
-    for points in bodies:
-        marks = np.empty(len(points.x), dtype=np.bool_)
-        _mark_all(points.x, grid, stencil, bases, marks)
-        near = BodyPoints(*(a[marks] for a in points))
-        slabs = slabs_of(near.x, grid, stencil)
-        for color in (0, 1):
-            _collect_color(near, grid, stencil, slabs, shares, color)
+    marks = np.empty(len(points.x), dtype=np.bool_)
+    _mark_all(points.x, grid, stencil, bases_of(nodes, grid.m.shape, stencil), marks)
+    near = BodyPoints(*(a[marks] for a in points))
+    slabs = slabs_of(near.x, grid, stencil)
+    for color in (0, 1):
+        _collect_color(near, grid, stencil, slabs, shares, color)
     return shares
 
 
@@ -161,15 +171,15 @@ def collect(points, grid, stencil, members, shares):
     for p in members:
         base, s = locate(vec(points.x, p, d), grid, stencil)
         w, dw = weights_per_axis(s, stencil), slopes_per_axis(s, stencil)
-        share = points.V0[p] * abs(volume_ratio(points.F, p, d)) / grid.dx ** len(d)
+        cells = points.V0[p] * abs(volume_ratio(points.F, p, d)) / grid.dx ** len(d)
         for c in range(columns(s, stencil)):
             k = column(c, stencil, d)
             for l in range(len(stencil)):
                 i = shares.slot[node(base, k, l)]
                 if i >= 0:
-                    shares.phi[i] += share * product(k, l, w)
+                    shares.phi[i] += cells * product(k, l, w)
                     dw_ip = gradient(k, l, w, dw, grid.dx)
-                    put_vec(shares.G, i, lin(1.0, vec(shares.G, i, d), -share, dw_ip))
+                    put_vec(shares.G, i, lin(1.0, vec(shares.G, i, d), -cells, dw_ip))
 
 
 @kernel
@@ -184,15 +194,16 @@ def volume_ratio(F, p, like):
 # the law at a node
 
 @kernel
-def normal_and_gap(one, two, k, like):
-    """Unit vector n from body 1 to body 2 at node k, and the width of the gap [m], negative in an
-    overlap. Without a gradient n is zero.
+def normal_and_gap(G1, G2, empty, dx):
+    """Unit vector n from body 1 to body 2, from the gradients of their shares, and the width of the
+    gap [m], negative in an overlap, from the share of space that is empty. Below LEAST_SLOPE there
+    is no normal, and n is zero.
     """
-    n = lin(1.0, vec(two.G, k, like), -1.0, vec(one.G, k, like))
+    n = lin(1.0, G2, -1.0, G1)
     slope = norm(n)
-    if not slope > 0.0:
-        return n, 0.0
-    return lin(1.0 / slope, n, 0.0, n), 2.0 * (1.0 - one.phi[k] - two.phi[k]) / slope
+    if not slope * dx > LEAST_SLOPE:
+        return lin(0.0, n, 0.0, n), 0.0
+    return lin(1.0 / slope, n, 0.0, n), 2.0 * empty / slope
 
 
 @kernel
@@ -208,18 +219,16 @@ def impulse(mw, n, load, mu):
 
 
 @kernel
-def separate(one, two, law, like, bounds):
-    """Velocities of both sides after contact at the nodes bounds[0] .. bounds[1] - 1; law is (mu,
-    dt).
-    """
-    mu, dt = law
+def separate(one, two, terms, like, bounds):
+    """Velocities of both sides after contact at the nodes bounds[0] .. bounds[1] - 1."""
     for k in range(bounds[0], bounds[1]):
         i, j = one.node[k], two.node[k]
         v1, v2 = vec(one.v, i, like), vec(two.v, j, like)
         m = one.m[i] * two.m[j] / (one.m[i] + two.m[j])
-        n, gap = normal_and_gap(one, two, k, like)
+        n, gap = normal_and_gap(vec(one.G, k, like), vec(two.G, k, like),
+                                1.0 - one.phi[k] - two.phi[k], terms.dx)
         mw = lin(m, v1, -m, v2)
-        l = impulse(mw, n, dot(n, mw) - m * max(gap, 0.0) / dt, mu)
+        l = impulse(mw, n, dot(n, mw) - m * max(gap, 0.0) / terms.dt, terms.mu)
         put_vec(one.v, i, lin(1.0, v1, -1.0 / one.m[i], l))
         put_vec(two.v, j, lin(1.0, v2, 1.0 / two.m[j], l))
 
@@ -229,8 +238,8 @@ def stick(one, two, like, bounds):
     """Give both sides their common velocity at the nodes bounds[0] .. bounds[1] - 1."""
     for k in range(bounds[0], bounds[1]):
         i, j = one.node[k], two.node[k]
-        share = one.m[i] / (one.m[i] + two.m[j])
-        v = lin(share, vec(one.v, i, like), 1.0 - share, vec(two.v, j, like))
+        weight = one.m[i] / (one.m[i] + two.m[j])
+        v = lin(weight, vec(one.v, i, like), 1.0 - weight, vec(two.v, j, like))
         put_vec(one.v, i, v)
         put_vec(two.v, j, v)
 
@@ -250,9 +259,9 @@ def _collect_color(points, grid, stencil, slabs, shares, color):
 
 
 @parallel_if_many
-def _separate_all(one, two, law, like):
+def _separate_all(one, two, terms, like):
     for c in prange(CHUNKS):
-        separate(one, two, law, like, chunk(c, len(one.node)))
+        separate(one, two, terms, like, chunk(c, len(one.node)))
 
 
 @parallel_if_many

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import kernel
+from .jit import kernel, leaf
 from .tensor import dot, fill, lin, norm, put_vec, vec
 
 PRESCRIBED, STICKY, NOSLIP, SLIP, SEPARATE = range(5)
@@ -57,6 +57,8 @@ def meet(contacts, pairs, v):
     What each collider changes is stored in contacts.dv. A node that colliders squeeze, so that no
     velocity suits all, or only one ESCAPE times theirs, moves with their mean velocity.
     """
+    if pairs[1] - pairs[0] == 1 and contacts.kind[contacts.part[pairs[0]]] >= SLIP:
+        return meet_plane(contacts, pairs[0], v)
     r = strongest(contacts, pairs, v)
     if r <= STICKY:
         return hold(contacts, pairs, v, r)
@@ -65,6 +67,28 @@ def meet(contacts, pairs, v):
         return hold(contacts, pairs, v, SEPARATE)
     u, basis, _ = projected(contacts, planes, v)
     return rub(contacts, planes, u, v, basis)
+
+
+@leaf
+def meet_plane(contacts, k, v):
+    """`meet` for a node in one collider, of the kind slip or separate."""
+    n, v_c, part = vec(contacts.n, k, v), vec(contacts.v, k, v), contacts.part[k]
+    a = dot(n, lin(1.0, v, -1.0, v_c))
+    if not (a < 0.0 or (a > 0.0 and contacts.kind[part] == SLIP)):
+        return v
+    size = norm(n)
+    e = lin(1.0 / size, n, 0.0, n)
+    u = lin(1.0, v, -a / dot(n, e), e)
+    l = dot(lin(1.0, u, -1.0, v), n) / dot(n, n)
+    dv, grip = lin(l, n, 0.0, n), contacts.mu[part] * abs(l)
+    if grip > 0.0:
+        t = lin(1.0, u, -1.0, v_c)
+        t = lin(1.0, t, -dot(t, e), e)
+        slide = norm(t)
+        lost = grip / slide if grip < slide else 1.0
+        u, dv = lin(1.0, u, -lost, t), lin(1.0, dv, -lost, t)
+    put_vec(contacts.dv, k, dv)
+    return u
 
 
 # colliders that hold the node

@@ -14,8 +14,10 @@ Every option and its reason:
   left out of the hash. Kernels of types or methods from outside of the package are not stored.
 * The threading layer is pinned (OpenMP where present, else Numba's own work queue): Numba's
   default changes when another package installs TBB. The bits of our results do not depend on it.
-* Waiting OpenMP threads sleep instead of spinning: on a machine that does other work too, spinning
-  made steps of small scenes 8 times slower. Set OMP_WAIT_POLICY=ACTIVE where the cores are yours.
+* Waiting OpenMP threads spin for about 0.1 ms, then sleep. Without the spin, the threads of a small
+  step sleep and wake several times; spinning for longer made steps of small scenes 8 times slower
+  on a machine that does other work too. Set GOMP_SPINCOUNT or OMP_WAIT_POLICY to choose otherwise.
+  The spin is that of GNU's library alone.
 * ``pipeline_class``: kernels of single arguments compute in single precision (`precision`).
 * ``no_cfunc_wrapper``: no kernel is handed to C, and the wrapper for that takes time to compile.
 * Parallel loops run over a fixed number of chunks, never over "one chunk per thread": a result is a
@@ -54,7 +56,9 @@ few_items = int(os.environ.get(FEW_ITEMS, "2000"))
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef)
 _OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True, "pipeline_class": Compiler}
 
-os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")     # read when the library is loaded
+if "OMP_WAIT_POLICY" not in os.environ:         # both are read when the library is loaded
+    os.environ["OMP_WAIT_POLICY"] = "PASSIVE"
+    os.environ.setdefault("GOMP_SPINCOUNT", "3000")
 if "NUMBA_SLP_VECTORIZE" not in os.environ:
     numba.config.SLP_VECTORIZE = 1
 if "NUMBA_THREADING_LAYER" not in os.environ:

@@ -83,6 +83,8 @@ def dense_nodes_beyond(grid, axis, limit, below):
         stop = min(max(limit - first, 0), stop)
     else:
         start = min(max(limit + 1 - first, 0), stop)
+    if start >= stop:
+        return np.empty(0, dtype=np.int64)
     slab = np.moveaxis(grid.m, axis, 0)[start:stop]
     i, *others = np.nonzero(slab > 0.0)
     others.insert(axis, i + start)

@@ -102,7 +102,14 @@ def slabs_of(x, grid, stencil):
     ends = np.cumsum(count.T.ravel()).reshape(n_slabs, CHUNKS)     # by slab, then by chunk
     order = np.empty(len(x), dtype=np.int64)
     _place_all(along, cut, stencil, np.ascontiguousarray((ends - count.T).T), order)
-    return Slabs(order, np.concatenate(([0], ends[:, -1])))
+    return Slabs(order, without_last_empty(np.concatenate(([0], ends[:, -1]))))
+
+
+def without_last_empty(start):
+    """Return the ends of slabs `start` (slabs + 1,) without those of empty slabs at the end, which
+    would have threads share the others unevenly.
+    """
+    return start[: np.searchsorted(start, start[-1]) + 1]
 
 
 @kernel

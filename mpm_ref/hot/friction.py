@@ -10,7 +10,7 @@ of energy, with the projector B on what the planes leave free, velocities v_k of
          = y^2/eps - y^3/(3 eps^2) + eps/3        below
 
 so that the friction is w along -B (u - c), and grows from 0 to w while the node creeps at less than
-eps [m/s] [Li2020]. The loads l_k are held constant while the sum of E (HOT-eq1) and of D is
+eps [m/s] [LiFerguson2020]. The loads l_k are held constant while the sum of E (HOT-eq1) and of D is
 minimised, and are then updated, until they no longer change.
 """
 

@@ -22,6 +22,7 @@ from .report import ProfiledSystem, Profiler, Solution
 
 RULES, CYCLE = LineSearchOptions(), CycleOptions()
 PRINTED = {"start": "zero", "balance": "none"}      # where HOT as printed is not our default
+RELEASED = {"start": "gravity", "balance": "none", "window": 8}     # of the authors' public code
 BALANCES = 5        # rounds of a method and a balance of rigid motions, at most
 CHOICES = {
     "descent": ("lbfgs", "newton", "admm"),
@@ -33,6 +34,7 @@ CHOICES = {
     "start": ("gravity", "zero"),
     "balance": ("rigid", "none"),
     "rebuild_when": REBUILD_RULES,
+    "return_map": ("lagged", "implicit"),
     "kernel": ("linear", "quadratic"),
     "implementation": ("blocks", "scipy"),
 }
@@ -61,6 +63,8 @@ class SolverOptions:
                                         # within the tolerance alone (see `rigid`)
     window: int = 8                     # pairs of L-BFGS
     rebuild_every: int = 0              # steps after which L-BFGS takes a new Hessian; 0: never
+    return_map: str = "lagged"          # of plastic flow: after the solve (printed), or "implicit",
+                                        # in the potential (see `return_map`)
     creep: float = 1e-4                 # sliding in a step [dx] below which friction is not full
     rebuild_when: str = "never"         # also where a step was "shortened", or shows it "stale"
     max_iterations: int = 10000         # outer (the release)
@@ -98,6 +102,9 @@ class SolverOptions:
         if self.descent == "admm" and (self.inverse, self.operator) != ("jacobi", "matrix"):
             raise ValueError('descent = "admm" has its own matrix: expected inverse = "jacobi" '
                              'and operator = "matrix"')
+        if self.descent == "admm" and self.return_map == "implicit":
+            raise ValueError("return_map = 'implicit' with the method 'admm', which splits an "
+                             "elastic energy: expected another method, such as 'hot-plus'")
         if self.operator == "matrix-free" and self.inverse in ("cycle", "sgs", "geometric"):
             raise ValueError(f"inverse = {self.inverse!r} needs a matrix: expected operator = "
                              '"matrix", or inverse = "jacobi" or "cg"')
@@ -134,6 +141,19 @@ def printed(method, **changes):
     Raises ValueError for unknown ones.
     """
     return options_of(method, **{**PRINTED, **changes})
+
+
+def released(method, **changes):
+    """Return the `SolverOptions` of a method by its name as the authors' public code has them, with
+    changes: `RELEASED`, that is the start g dt, no balance, a window of 8; and CG of the coarsest
+    level is relative to the right-hand side of the cycle.
+
+    Two things are not repeated: that code adds the last accepted step once more at the end of a
+    solve, and lets the unit rows of fixed nodes enter the coarser matrices. Raises ValueError for
+    unknown names.
+    """
+    options = options_of(method, **{**RELEASED, **changes})
+    return replace(options, cycle=options.cycle._replace(stop="load"))
 
 
 def solve(system, options, stop, profiler):

@@ -5,8 +5,8 @@
     F_p   = (I + dt L_p) F_p^n,    L_p = sum_i (v_i + dv_i) dw_ip^T
 
 with the gravity b; heights are counted from the nodes at the start of the step. F_p^n is elastic:
-return maps are lagged (HOT-sec3.1-seq). Where g = 0, m_i dv_i / dt is the force after the step.
-Where planes rub, the dissipation of `friction` is part of E.
+return maps are lagged (HOT-sec3.1-seq), or part of psi (see `return_map`). Where g = 0, m_i dv_i/dt
+is the force after the step. Where planes rub, the dissipation of `friction` is part of E.
 
 The Hessian is an operator or a matrix (HOT-sec3.1-seq):
 
@@ -34,11 +34,22 @@ from ..core.tensor import (
     put_mat,
     transpose,
 )
-from ..materials import FixedCorotated, Fluid, Hencky, LogNeoHookean, NeoHookean, fluid, hencky
+from ..materials import (
+    FixedCorotated,
+    Fluid,
+    Hencky,
+    LogNeoHookean,
+    NeoHookean,
+    YieldingHencky,
+    fluid,
+    hencky,
+    yielding_hencky,
+)
 from ..materials.principal import apply, local, local_spd
 from . import friction
 from .assembly import assembled, diagonal, pattern_of
 from .quadrature import StressModes, pairs_of, quadrature_points
+from .return_map import law_of
 from .transfer import add_forces, gradients, largest_velocity
 
 
@@ -46,17 +57,18 @@ class Potential:
     """E of the velocity increments dv (n, d) [m/s] of a step of dt [s], on the nodes `unknowns`.
 
     Particles may have any law and are not changed; gravity (d,) is an acceleration [m/s^2].
-    `friction` is a `Friction` or None.
+    `friction` is a `Friction` or None; return_map is that of `SolverOptions`.
     """
 
     friction = None
 
-    def __init__(self, bodies, unknowns, stencil, dt, gravity):
+    def __init__(self, bodies, unknowns, stencil, dt, gravity, return_map="lagged"):
         self.bodies, self.unknowns, self.stencil, self.dt = bodies, unknowns, stencil, dt
         self.weight = unknowns.m[:, None] * np.asarray(gravity, dtype=float)
         self.box = box_of(unknowns)
         self.at = np.flatnonzero(unknowns.number.reshape(-1) >= 0)
-        self.points = tuple(quadrature_points(body, self.box, stencil) for body in bodies)
+        self.points = tuple(quadrature_points(body, self.box, stencil, return_map)
+                            for body in bodies)
 
     def with_friction(self, friction):
         """Return this potential with a `Friction` or None; they share all arrays."""
@@ -82,6 +94,12 @@ class Potential:
         g -= self.dt * self.weight
         self.add_friction(dv, g)
         return E, g
+
+    def dissipated(self, dv):
+        """Return the dissipation D [J] of the friction at dv, 0 where there is none."""
+        if self.friction is None:
+            return 0.0
+        return friction.energy(self.friction, self.unknowns.v + dv)
 
     def add_friction(self, dv, g):
         """Add dD/du (n, d) [kg m/s] of the friction, where there is some, to g."""
@@ -138,9 +156,7 @@ class Potential:
         for body, points in zip(self.bodies, self.points):
             update_response(points, body.law, self.dt)
             E += total(points.psi)
-        if self.friction is not None:
-            E += friction.energy(self.friction, u)
-        return float(E)
+        return float(E) + self.dissipated(dv)
 
 
 def box_of(unknowns):
@@ -170,7 +186,8 @@ def energies_and_stresses(points, law, dt, like, bounds):
     """psi_p and T_p of the particles bounds[0] .. bounds[1] - 1; before, T_p holds L_p."""
     for p in range(bounds[0], bounds[1]):
         F_n = mat(points.F, p, like)
-        psi, P = energy_and_stress(new_gradient(mat(points.T, p, like), dt, F_n), law)
+        F = new_gradient(mat(points.T, p, like), dt, F_n)
+        psi, P = energy_and_stress(F, law_of(law, points.tau_y, p))
         points.psi[p] = points.V0[p] * psi
         put_mat(points.T, p, mlin(dt * points.V0[p], mmt(P, F_n), 0.0, F_n))
 
@@ -191,6 +208,7 @@ def direct_response(F, law):
 
 energy_and_stress.method(FixedCorotated, fixed_corotated_response)
 energy_and_stress.method(Hencky, hencky.psi_and_pk1)
+energy_and_stress.method(YieldingHencky, yielding_hencky.psi_and_pk1)
 for _law in (NeoHookean, LogNeoHookean, Fluid):
     energy_and_stress.method(_law, direct_response)
 
@@ -257,7 +275,8 @@ def differentiate(points, law, options, modes, like, bounds):
     for p in range(bounds[0], bounds[1]):
         F_n = mat(points.F, p, like)
         U, s, V, _ = svd(new_gradient(mat(points.T, p, like), dt, F_n))
-        A, pairs = local_spd(s, law) if projected else local(s, law)
+        own = law_of(law, points.tau_y, p)
+        A, pairs = local_spd(s, own) if projected else local(s, own)
         scale = dt * dt * points.V0[p]
         put_mat(modes.U, p, U)
         put_mat(modes.W, p, mm(F_n, V))

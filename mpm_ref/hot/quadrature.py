@@ -13,9 +13,11 @@ import numpy as np
 
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..core.law import intact
-from ..core.order import by_cell, slab_width
+from ..core.order import by_cell, slab_width, without_last_empty
+from ..core.state import NO_HISTORY
 from ..core.stencil import locate
 from ..core.tensor import diag, mat, put_mat, put_vec, vec
+from .return_map import yield_stresses
 
 
 class QuadraturePoints(NamedTuple):
@@ -26,12 +28,14 @@ class QuadraturePoints(NamedTuple):
     F: np.ndarray       # (N, d, d)     deformation gradient at the start of the step
     V0: np.ndarray      # (N,)          volume at rest [m^d]
     slab: np.ndarray    # (slabs + 1,)  first particle of each slab
+    tau_y: np.ndarray   # (N,)          yield stress [Pa], or (0, 0): the potential is elastic
     psi: np.ndarray     # (N,)          workspace: energy [J]
     T: np.ndarray       # (N, d, d)     workspace: a velocity gradient, then a stress
 
 
-def quadrature_points(body, grid, stencil):
-    """`QuadraturePoints` of a body inside the grid, without the particles that have failed.
+def quadrature_points(body, grid, stencil, return_map="lagged"):
+    """`QuadraturePoints` of a body inside the grid, without the particles that have failed; with
+    yield stresses if return_map is "implicit".
 
     A fluid, which carries J alone, gets an F with that determinant: its law depends on no more.
     """
@@ -41,8 +45,9 @@ def quadrature_points(body, grid, stencil):
     _fill_points_all(body.particles, grid, stencil, order, (base, s, F, V0))
     width = slab_width(stencil)
     slabs = np.arange(-(-grid.m.shape[0] // width) + 1)
-    start = np.searchsorted(base[:, 0] // width, slabs)
-    return QuadraturePoints(base, s, F, V0, start, np.empty(n), np.empty((n, d, d)))
+    start = without_last_empty(np.searchsorted(base[:, 0] // width, slabs))
+    tau_y = NO_HISTORY if return_map == "lagged" else yield_stresses(body, order)
+    return QuadraturePoints(base, s, F, V0, start, tau_y, np.empty(n), np.empty((n, d, d)))
 
 
 def cell_order(body, grid, stencil):

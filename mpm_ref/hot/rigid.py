@@ -22,6 +22,8 @@ ROUND_OFF = 1e-13       # of the momenta in a sum, below which it counts as zero
 DEPENDENT = 1e-10       # share of the largest inertia below which a motion is that of others
 ADMITTED = 1e-10        # largest share of a motion that conditions may take from an admitted one
 ROUNDS = 12             # of corrections, at most: y depends on dv
+FRICTION_ROUNDS = 60    # ... with friction, whose kink shortens corrections
+LEAST_SHARE = 1e-9      # of a correction
 
 
 class RigidMotions:
@@ -49,7 +51,7 @@ class RigidMotions:
             return dv
         m, kinetic = self.unknowns.m, self.unknowns.v**2 + (self.dt * self.weight) ** 2 / (
             self.unknowns.m[:, None] ** 2)
-        for _ in range(ROUNDS):
+        for _ in range(ROUNDS if self.potential.friction is None else FRICTION_ROUNDS):
             slack = ROUND_OFF**2 * self.sums((m[:, None] * (kinetic + dv**2)).sum(axis=1))
             R = self.motions(dv)
             Z = self.admitted(R)
@@ -63,8 +65,24 @@ class RigidMotions:
             rho = np.where(off[:, None], rho, 0.0)
             c = np.einsum("kqs,ks->kq", Z, self.corrections(rho, R, Z, dv))
             u = np.einsum("naq,nq->na", R, c[self.label])
-            dv = dv - np.einsum("nab,nb->na", self.unknowns.B, u)
+            dv = self.advanced(dv, np.einsum("nab,nb->na", self.unknowns.B, u))
         return dv
+
+    def advanced(self, dv, u):
+        """Return dv - u, or with friction dv less so much of u that the convex sum of kinetic
+        energy, work of gravity and D falls, which the kink of D may forbid the whole of u.
+        """
+        if self.potential.friction is None:
+            return dv - u
+        before, share = self.rigid_energy(dv), 1.0
+        while share > LEAST_SHARE and not self.rigid_energy(dv - share * u) <= before:
+            share *= 0.5
+        return dv - share * u
+
+    def rigid_energy(self, dv):
+        """Return sum m |dv|^2/2 - dt m g . dv + D [J], all that rigid motions change."""
+        impulse = 0.5 * self.unknowns.m[:, None] * dv - self.dt * self.weight
+        return float((impulse * dv).sum()) + self.potential.dissipated(dv)
 
     def corrections(self, rho, R, Z, dv):
         """Return the steps of Newton's method that end the sums rho (parts, q) of motions R Z."""

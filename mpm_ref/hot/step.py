@@ -5,6 +5,7 @@ minimises the incremental potential (HOT-eq1) under the conditions; grid to part
 and, lagged, the return map.
 """
 
+from dataclasses import replace
 from functools import partial
 from math import inf
 from typing import NamedTuple
@@ -21,9 +22,11 @@ from .multigrid.geometric import CoarseGrids, coarse_conditions
 from .norms import characteristic_norms
 from .potential import Potential
 from .report import combined_report
+from .return_map import check_return_map
 from .system import System, Unknowns, free_part, unknowns_of
 
 MAX_UPDATES = 20      # of the active set and loads; after that, nodes stay as they are
+FRICTION_TOLERANCE = 1e-3   # of the displacement in a step with friction [dx]
 LOAD_CHANGE = 1e-3    # of the sum of frictions: smaller changes between two solves end the step
 
 
@@ -49,7 +52,7 @@ class ImplicitStepper(Stepper):
 
     def __init__(self, scheme, dx, dim, gravity, conditions=None, options=None):
         super().__init__(scheme, dx, dim, gravity, conditions)
-        self.options = SolverOptions() if options is None else options
+        self.options = options_for(SolverOptions() if options is None else options, conditions)
         self.report = None
         self.active_set_updates = 0         # in the last solve
         check_scheme(scheme)
@@ -57,10 +60,11 @@ class ImplicitStepper(Stepper):
 
     def start(self, bodies):
         """Prepare the bodies, as `explicit.Stepper.start`. Raises ValueError for body forces of
-        particles.
+        particles, and for a flow without potential where the options ask for one.
         """
         super().start(bodies)
         for body in bodies:
+            check_return_map(body, self.options.return_map)
             if body.particles.b.ndim == 2:
                 raise ValueError(f"body {body.name!r} has body forces b of its own: expected "
                                  "gravity alone with an implicit integrator")
@@ -92,7 +96,7 @@ class ImplicitStepper(Stepper):
         grid = scatter(bodies, self.storage, self.scheme, 0.0)
         unknowns, active_set = self._constrained(grid, self.conditions, t, dt)
         stencil = potential_stencil(self.scheme)
-        potential = Potential(bodies, unknowns, stencil, dt, self.gravity)
+        potential = Potential(bodies, unknowns, stencil, dt, self.gravity, self.options.return_map)
         if active_set is not None:
             impulse = first_impulse(unknowns, dt * self.gravity)
             potential = potential.with_friction(self._friction(active_set, potential, impulse))
@@ -189,7 +193,7 @@ def first_impulse(unknowns, gravity_increment):
 
 
 def load_change(old, new):
-    """Return the sum of the changes of two `Friction` or None over the sum of the new one."""
+    """Return the sum of the changes of w in two `Friction` or None over the sum of the new one."""
     if old is None or new is None:
         return 0.0 if old is new else inf
     size = max(old.node.max(), new.node.max()) + 1
@@ -210,10 +214,24 @@ def write_velocities(grid, unknowns, v):
     nodes[at] = v
 
 
+def has_friction(conditions):
+    """Return whether a part of conditions, or None, rubs."""
+    return any(part.friction for part in getattr(conditions, "rules", ()))
+
+
+def options_for(options, conditions):
+    """Return the `SolverOptions` of a step under conditions: with friction the error of the
+    displacement is bounded, by `FRICTION_TOLERANCE` where the options have no bound, since the
+    loads of stiff bodies are lost in the tolerance of the gradient.
+    """
+    if not has_friction(conditions) or options.displacement_tolerance:
+        return options
+    return replace(options, displacement_tolerance=FRICTION_TOLERANCE)
+
+
 def check_friction(conditions, options):
     """Raise ValueError for friction with a method that has no place for it."""
-    rubs = conditions is not None and any(part.friction for part in conditions.rules)
-    if rubs and options.descent == "admm":
+    if has_friction(conditions) and options.descent == "admm":
         raise ValueError("friction with the method 'admm': its splitting knows inertia and "
                          "elasticity alone; expected another method, such as 'hot-plus'")
 

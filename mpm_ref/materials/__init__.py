@@ -28,6 +28,7 @@ from . import (
     snow_clamp,
     von_mises,
     waves,
+    yielding_hencky,
 )
 from .drucker_prager import DruckerPrager
 from .fixed_corotated import FixedCorotated
@@ -45,6 +46,7 @@ from .snow_clamp import SnowClamp
 from .table import FLOWS, LAWS, Material, make_flow, make_law, recovers
 from .von_mises import Hardening, Softening, VonMises
 from .waves import stiffness, wave_modulus
+from .yielding_hencky import YieldingHencky
 
 __all__ = [
     "FLOWS",
@@ -64,6 +66,7 @@ __all__ = [
     "SnowClamp",
     "Softening",
     "VonMises",
+    "YieldingHencky",
     "bulk_modulus",
     "dpk1_spd",
     "lame",
@@ -85,6 +88,8 @@ for _law, _file in ((FixedCorotated, fixed_corotated), (Hencky, hencky),
     law.kirchhoff_vjp.method(_law, principal.kirchhoff_vjp)
 law.kirchhoff_of_stretch.method(FixedCorotated, fixed_corotated.kirchhoff_of_stretch)
 law.corotated.method(FixedCorotated, fixed_corotated.corotated)
+for _function in (principal.pk1_hat, principal.dpk1_hat, principal.pair):
+    _function.method(YieldingHencky, getattr(yielding_hencky, _function.__name__))
 law.kirchhoff_of_strain.method(Hencky, hencky.kirchhoff_of_strain)
 law.pressure.method(Fluid, fluid.pressure)
 law.d_pressure.method(Fluid, fluid.d_pressure)

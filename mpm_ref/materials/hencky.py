@@ -147,12 +147,12 @@ def pair(s, i, j, law):
     [Pa].
     """
     P, tau, r = pk1_hat(s, law), kirchhoff_hat(s, law), inverse(s)
-    a = (2.0 * law.mu * _log_ratio((s[i] - s[j]) * r[j]) - tau[j]) * r[i] * r[j]
+    a = (2.0 * law.mu * log_ratio((s[i] - s[j]) * r[j]) - tau[j]) * r[i] * r[j]
     return a, (P[i] + P[j]) * r[i] * r[j] / (r[i] + r[j])
 
 
 @kernel
-def _log_ratio(x):
+def log_ratio(x):
     """Return log(1 + x)/x, 1 at x = 0."""
     return log1p(x) / x if x != 0.0 else 1.0
 

@@ -28,7 +28,7 @@ STAGES = {          # of a step: beginnings of the names of the kernels that it 
     "colliders and regions: nodes tested": ("core.boundary._pull_back",),
     "colliders, regions, walls: nodes in contact": ("core.boundary._settle",),
     "colliders: points of their surface": ("core.surface.",),
-    "contact of bodies": ("core.body_contact.",),
+    "contact of bodies": ("core.body_contact.", "core.crowded_nodes."),
     "implicit solve": ("hot.",),
     "multigrid": ("hot.multigrid.",),
     "grid to particles": ("core.transfer_lines.gather", "core.transfer_mls3.gather"),

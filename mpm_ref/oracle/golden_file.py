@@ -37,6 +37,7 @@ def record(problem, path, steps, overwrite=False, begin=0, eps=None):
     """
     require_writable(path, overwrite)
     require_recordable(problem)
+    check_implicit(problem)
     module = implicit_recording if problem.integrator == "implicit" else recording
     return write_golden(with_tolerance(problem, eps), path, (steps, begin), module.record_steps)
 
@@ -159,7 +160,6 @@ def require_recordable(problem):
     if problem.scheme.gimp:
         raise ValueError(f"gimp = {problem.scheme.gimp}: golden files have weights of splines; "
                          "expected a scene with gimp = 0")
-    check_implicit(problem)
     for body in problem.bodies:
         for part, table in ((body.law, LAWS), (body.flow, FLOWS)):
             if type(part).__name__ not in table:
@@ -174,9 +174,12 @@ def check_implicit(problem):
     if problem.scheme.transfer == "mls":
         raise ValueError("transfer = 'mls' with an implicit integrator: its plain twin has the "
                          "gradient form alone; expected 'apic', 'pic' or 'flip'")
-    if problem.conditions is not None and any(part.friction for part in problem.conditions.rules):
+    if any(part.friction for part in getattr(problem.conditions, "rules", ())):
         raise ValueError("friction with an implicit integrator: its plain twin has none; expected "
                          "a scene without, or integrator = \"explicit\"")
+    if problem.solver is not None and problem.solver.return_map == "implicit":
+        raise ValueError("return_map = 'implicit': the plain twin of implicit steps lags it; "
+                         "expected 'lagged'")
     if problem.scheme.mass_eps:
         raise ValueError(f"mass_eps = {problem.scheme.mass_eps} with an implicit integrator: its "
                          "plain twin has none; expected 0")

@@ -15,7 +15,7 @@ from ..core import motion as rigid
 from ..core.boundary import BoxWalls, Conditions, Prescribed
 from ..core.boundary import Collider as RigidCollider
 from ..core.surface import SurfaceConditions
-from ..hot.methods import METHODS, options_of
+from ..hot.methods import METHODS, options_of, released
 from ..hot.step import check_scheme
 from ..materials import Material
 from ..materials.learned.guard import guarded, strain_box
@@ -230,7 +230,10 @@ def build_solver(scene):
     if scene.contact:
         raise SceneError("contact: expected none with an implicit integrator, whose bodies have "
                          "one velocity field")
-    return options_of(scene.integrator, **(scene.solver.given() if scene.solver else {}))
+    if scene.solver is None:
+        return options_of(scene.integrator)
+    options = released if scene.solver.as_released else options_of
+    return options(scene.integrator, **scene.solver.given())
 
 
 def build_limits(scene):

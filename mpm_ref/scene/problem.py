@@ -4,6 +4,8 @@ import hashlib
 
 import numpy as np
 
+from ..hot.return_map import check_return_map
+from ..hot.step import check_friction
 from ..problem import Problem
 from ..sampling.arrays import QUANTITIES, check_arrays
 from .builder import build_bodies
@@ -59,6 +61,8 @@ def problem_from_arrays(bodies, dx, **keys):
 def _problem_of(scene, arrays):
     (clock, limits, conditions, solver, contacts, _), clip = scene.parts, scene.clip
     bodies, strain_bounds = build_bodies(scene, arrays)
+    if solver is not None:
+        check_implicit_parts(bodies, conditions, solver)
     return Problem(
         bodies=bodies,
         dx=scene.dx,
@@ -108,3 +112,12 @@ def _digest(arrays):
     for name in sorted(arrays):
         digest.update(f"{name}{arrays[name].shape}".encode() + arrays[name].tobytes())
     return digest.hexdigest()
+
+
+def check_implicit_parts(bodies, conditions, solver):
+    """Raise SceneError for friction or a return map that the options of implicit steps exclude."""
+    with errors_at("integrator"):
+        check_friction(conditions, solver)
+    for k, body in enumerate(bodies):
+        with errors_at(f"body[{k}].material.flow"):
+            check_return_map(body, solver.return_map)

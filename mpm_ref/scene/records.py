@@ -313,10 +313,12 @@ class Scheme(Record):
 class Solver(Record):
     """Options of implicit steps; the defaults are those of the method (see `hot.methods`)."""
 
+    as_released: bool = False                   # defaults of the authors' public code instead
     eps: Positive | None = None                 # tolerance of the scaled gradient
     displacement_tolerance: NotNegative | None = None       # error of a step [dx]
     start: Literal["gravity", "zero"] | None = None         # of the increment
     balance: Literal["rigid", "none"] | None = None         # of rigid motions
+    return_map: Literal["lagged", "implicit"] | None = None     # of plastic flow
     creep: Positive | None = None               # sliding in a step, friction is not full below [dx]
     window: Natural | None = None               # pairs of L-BFGS
     rebuild_every: Natural | None = None        # steps between Hessians of L-BFGS
@@ -330,6 +332,7 @@ class Solver(Record):
     def given(self):
         """Return the keys that are given, as a dictionary."""
         values = {name: getattr(self, name) for name in self.__struct_fields__}
+        del values["as_released"]
         return {name: value for name, value in values.items() if value is not None}
 
 

@@ -214,6 +214,7 @@ def change_integrator(tables, word):
     averages no volumes or splines and does not relax, in double precision, and whose conditions
     hold at nodes.
     """
+    was_explicit = tables["integrator"] == "explicit"
     tables["integrator"] = word
     if word == "explicit":
         tables.pop("solver", None)
@@ -221,7 +222,7 @@ def change_integrator(tables, word):
         return
     tables["boundary"] = "nodes"
     tables["scheme"] |= {"f_bar": False, "gimp": 0.0, "relaxation": 0.0, "precision": "double"}
-    if tables["scheme"].get("transfer") in (None, "mls"):
+    if was_explicit and tables["scheme"].get("transfer") in (None, "mls"):
         tables["scheme"]["transfer"] = "apic"
 
 

@@ -37,7 +37,7 @@ HOPELESS = 3.0              # times the best cost, after which a candidate's run
 BEST_SINGLES = 4            # whose pairs are tried
 PERTURBED = "perturbed"     # label of the perturbed run
 ALTERNATIVE = {"mls": "apic", "apic": "mls", "flip": "apic", "pic": "apic"}
-IMPLICIT_ALTERNATIVE = {"apic": "flip", "flip": "apic", "pic": "apic"}  # MLS has no implicit step
+IMPLICIT_ALTERNATIVE = {"mls": "apic", "apic": "flip", "flip": "apic", "pic": "apic"}
 
 
 @dataclass

@@ -191,6 +191,8 @@ def test_files_of_the_recommended_scene_are_named_from_its_folder(tmp_path):
 
 
 def test_without_a_budget_there_is_no_answer(folder, tmp_path):
+    """And none is left of an earlier call."""
+    (tmp_path / "flight.best.toml").write_text("an earlier answer")
     done = mpm_ref("trade", folder / "flight.toml", "--error", "0.0001%", "--out", tmp_path,
                    "--budget", "1s", "--workers", "1", "--quiet")
     assert done.exit_code == 1

@@ -118,11 +118,16 @@ def test_a_solver_without_a_method_says_what_to_do(scene):
                     'add integrator = "hot"', "or remove this table")
 
 
-def test_friction_names_its_part(scene):
+def test_friction_is_for_all_methods_but_admm(scene):
     scene.write_text(HOT + FLOOR)
-    assert_told(mpm_ref("info", scene), 2, f"{scene}: collider[1].friction = 0.3: expected 0")
-    scene.write_text(HOT + '\n[walls]\nlow = ["open", 3]\nkind = "slip"\nfriction = 0.2\n')
-    assert_told(mpm_ref("info", scene), 2, f"{scene}: walls.friction = 0.2: expected 0")
+    assert mpm_ref("info", scene).exit_code == 0
+    scene.write_text(HOT.replace('"hot"', '"admm"') + FLOOR)
+    assert_told(mpm_ref("info", scene), 2, f"{scene}: integrator: friction with the method 'admm'")
+    plastic = HOT + '\n[solver]\nreturn_map = "implicit"\n'
+    snow = 'nu = 0.3, flow = { type = "snow_clamp", s_min = 0.9, s_max = 1.1 } }'
+    scene.write_text(plastic.replace("nu = 0.3 }", snow))
+    assert_told(mpm_ref("info", scene), 2, f"{scene}: body[0].material.flow: body ",
+                "with return_map = 'implicit'")
 
 
 @pytest.mark.parametrize(("solver", "key"), [

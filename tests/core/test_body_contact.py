@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
-from grids import DX, positions
+from grids import DX, over, positions
 from threads import by_threads
 
 from mpm_ref.body import particles_at
 from mpm_ref.core.body_contact import (
+    LEAST_SLOPE,
     BodyPoints,
+    ContactTerms,
     Side,
     apply_contact,
     glue,
@@ -17,6 +19,7 @@ from mpm_ref.core.body_contact import (
 )
 from mpm_ref.core.gimp import gimp_stencil
 from mpm_ref.core.grid import Storage, update
+from mpm_ref.core.jit import item_count
 from mpm_ref.core.order import slabs_of
 from mpm_ref.core.spline import STENCILS
 from mpm_ref.core.transfer import p2g
@@ -71,8 +74,9 @@ def touched(fields, mu=MU, stencil=STENCILS[2]):
     """The grids of two fields before and after contact, and their common nodes."""
     before, after = ([grid_of_field(q, stencil) for q in fields] for _ in range(2))
     nodes = shared_nodes(*after)
-    sides = [(grid, [cloud(q)]) for grid, q in zip(after, fields, strict=True)]
-    apply_contact(*sides, nodes, (mu, DT), stencil)
+    sides = [(grid, shares_near(at, cloud(q), grid, stencil))
+             for grid, q, at in zip(after, fields, nodes, strict=True)]
+    apply_contact(*sides, nodes, ContactTerms(mu, DT, DX))
     return before, after, nodes
 
 
@@ -80,11 +84,10 @@ def geometry(fields, degree=2):
     """Normals (K, d) and gaps (K,) [cells] at the common nodes, and their positions (K, d)."""
     grids, d = [grid_of_field(q, STENCILS[degree]) for q in fields], fields[0].x.shape[1]
     nodes = shared_nodes(*grids)
-    sides = []
-    for grid, q, at in zip(grids, fields, nodes, strict=True):
-        near = shares_near(at, [cloud(q)], grid, STENCILS[degree])
-        sides.append(Side(grid.m, grid.v, at, near.phi, near.G))
-    rows = [normal_and_gap(*sides, k, tuple(range(d))) for k in range(len(nodes.first))]
+    one, two = (shares_near(at, cloud(q), grid, STENCILS[degree])
+                for grid, q, at in zip(grids, fields, nodes, strict=True))
+    rows = [normal_and_gap(tuple(one.G[k]), tuple(two.G[k]), 1.0 - one.phi[k] - two.phi[k], DX)
+            for k in range(len(nodes.first))]
     x = positions(grids[0]).reshape(-1, d)[nodes.first]
     return np.array([n for n, _ in rows]), np.array([gap for _, gap in rows]) / DX, x
 
@@ -111,22 +114,11 @@ def test_velocities_are_those_of_the_plain_twin(d, degree, gimp, mu, rng):
     shares = [volume_share(q.V0 * np.abs(np.linalg.det(q.F)), ip, box, DX)
               for q, ip in zip(fields, ips, strict=True)]
     m, v = ([over(grid, getattr(grid, name), box) for grid in before] for name in ("m", "v"))
-    expected = touching_velocities(m, v, shares, mu, DT)
+    expected = touching_velocities(m, v, shares, {(0, 1): mu}, (DT, DX))
     changed = sum((a != b).any(axis=-1).sum() for a, b in zip(v, expected, strict=True))
     assert changed > 4
     for grid, u in zip(after, expected, strict=True):
         assert over(grid, grid.v, box) == pytest.approx(u, abs=1e-9)
-
-
-def over(grid, a, box):
-    """Nodal values over a box, 0 where the grid has no node."""
-    out = np.zeros((*box.shape, *a.shape[grid.m.ndim:]))
-    low = np.maximum(grid.origin, box.first)
-    high = np.minimum(grid.origin + grid.m.shape, box.first + box.shape)
-    here, there = ((slice(*ends) for ends in zip(low - first, high - first, strict=True))
-                   for first in (box.first, grid.origin))
-    out[tuple(here)] = a[tuple(there)]
-    return out
 
 
 # conservation
@@ -185,11 +177,36 @@ def test_a_gap_is_measured_at_the_nodes_beside_it(width, rng):
     assert gap[near] == pytest.approx(width, abs=0.05)
 
 
-def stacked(rng, d, shift, width):
-    """Two blocks of the same size whose faces are `width` cells apart."""
+@pytest.mark.parametrize(("height", "expected"), [(2.0, 0.0), (1.0, 1 / 44), (0.5, 5 / 16)])
+def test_a_thin_body_seems_farther_away(height, expected, rng):
+    """Flush on a block: space behind it counts as gap, as seen from a node on the face."""
+    fields = stacked(rng, 2, 0.0, 0.0, height)
+    _, gap, x = geometry(fields)
+    face = (np.abs(x[:, 0] / DX - 4.0) < 1.6) & (np.abs(x[:, 1] / DX - 4.0) < 0.1)
+    assert face.sum() > 1
+    assert gap[face] == pytest.approx(expected, abs=1e-9)
+
+
+def test_space_of_a_collider_counts_as_gap(rng):
+    """Two blocks side by side on a floor: from a node on the floor they seem 4/3 cells apart, and
+    one cell above they touch up to a fiftieth.
+    """
+    fields = tuple(q._replace(x=np.ascontiguousarray(q.x[:, ::-1]))
+                   for q in stacked(rng, 2, 0.0, 0.0))
+    _, gap, x = geometry(fields)
+    floor, above = (gap[(np.abs(x[:, 0] / DX - 4.0) < 0.1) & (np.abs(x[:, 1] / DX - y) < 0.1)]
+                    for y in (0.0, 1.0))
+    assert floor == pytest.approx(4 / 3, abs=1e-9)
+    assert above == pytest.approx(4 / 189, abs=1e-9)
+
+
+def stacked(rng, d, shift, width, height=4.0):
+    """Two blocks of the same size whose faces are `width` cells apart, or an upper one of another
+    height.
+    """
     sides = [0.0] * (d - 1), [8.0] * (d - 1)
     lower = box_of_points([*sides[0], 0.0], [*sides[1], 4.0])
-    upper = box_of_points([*sides[0], 4.0], [*sides[1], 8.0])
+    upper = box_of_points([*sides[0], 4.0], [*sides[1], 4.0 + height])
     lower[:, -1] += shift * DX
     upper[:, -1] += (shift + width) * DX
     return matter(rng, lower), matter(rng, upper)
@@ -207,7 +224,37 @@ def test_volumes_are_those_of_the_deformed_bodies(rng):
     assert same == pytest.approx(gap, abs=1e-12)
 
 
+def test_bodies_that_lie_in_each_other_have_no_normal(rng):
+    """Their shares are equal up to round-off, and nothing acts; beside them it does."""
+    x = box_of_points([0.0, 0.0], [8.0, 8.0])
+    fields = matter(rng, x), matter(rng, x + 1e-6 * DX)
+    n, gap, places = geometry(fields)
+    inner = (np.abs(places / DX - 4.0) < 2.1).all(axis=1)
+    assert (n[inner] == 0.0).all()
+    assert (gap[inner] == 0.0).all()
+    before, after, nodes = touched(fields)
+    for old, new, at in zip(before, after, nodes, strict=True):
+        v, u = (g.v.reshape(-1, 2)[at][inner] for g in (old, new))
+        assert (v == u).all()
+    fields[1].x[:, 0] += 6.0 * DX
+    assert np.linalg.norm(geometry(fields)[0], axis=1).max() == pytest.approx(1.0)
+
+
+def test_the_least_slope_is_one_of_a_cell():
+    up, flat = (0.0, 1.01 * LEAST_SLOPE / DX), (0.0, 0.99 * LEAST_SLOPE / DX)
+    n, gap = normal_and_gap((0.0, 0.0), up, 0.1, DX)
+    assert n == pytest.approx((0.0, 1.0))
+    assert gap == pytest.approx(0.2 / up[1])
+    assert normal_and_gap((0.0, 0.0), flat, 0.1, DX) == ((0.0, 0.0), 0.0)
+
+
 # nodes, glue, bits
+
+def test_loops_count_the_nodes_that_are_shared():
+    """Not those of the grid: threads start where there are many of the former."""
+    side = Side(m=np.ones(10000), v=np.ones((10000, 2)), node=np.zeros(3, np.int64),
+                phi=np.zeros(3), G=np.zeros((3, 2)))
+    assert item_count(side) == 3
 
 @pytest.mark.parametrize("cells", [9.0, -9.0, 40.0])
 def test_bodies_far_apart_share_no_node(d, cells, rng):

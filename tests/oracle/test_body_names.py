@@ -11,6 +11,7 @@ from mpm_ref.core.boundary import Collider
 from mpm_ref.core.levelset import half_space
 from mpm_ref.core.surface import SurfaceConditions
 from mpm_ref.explicit import Scheme
+from mpm_ref.hot.methods import options_of
 from mpm_ref.oracle.schema import reserved_names
 
 
@@ -54,6 +55,18 @@ def test_gimp_is_refused(tmp_path):
     problem = replace(stretched(), scheme=Scheme(transfer="pic", gimp=2.0))
     with pytest.raises(ValueError, match=r"gimp = 2.0: golden files have weights of splines"):
         oracle.record(problem, tmp_path / "golden.h5", 1)
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({}, "friction with an implicit integrator: its plain twin"),
+    ({"scheme": Scheme()}, "'mls' with an implicit integrator: its plain twin"),
+    ({"conditions": None, "scheme": Scheme(transfer="apic", mass_eps=1e-7)}, "mass_eps = 1e-07"),
+    ({"conditions": None, "solver": options_of("hot", return_map="implicit")}, "return_map = 'im"),
+])
+def test_forms_of_implicit_steps_without_twin_are_refused(changes, message, tmp_path):
+    implicit = {"integrator": "implicit", "scheme": Scheme(transfer="apic")}
+    with pytest.raises(ValueError, match=message):
+        oracle.record(replace(stretched(), **(implicit | changes)), tmp_path / "golden.h5", 1)
 
 
 def test_conditions_at_surfaces_are_refused(tmp_path):

@@ -7,6 +7,7 @@ import msgspec
 import pytest
 
 from mpm_ref.scene import build, load
+from mpm_ref.scene.records import Solver
 from mpm_ref.simulate import simulate
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
@@ -25,3 +26,13 @@ def test_shipped_scene_runs(path, integrator):
         state = frame.state
     assert state.step == STEPS
     assert integrator == "explicit" or state.solve.converged
+
+
+def test_solver_as_released():
+    """Keys that are given win over the defaults of the public code."""
+    scene = load(Path(__file__).parents[2] / "scenes" / "hot_twist.toml")
+    printed, public = (build(msgspec.structs.replace(scene, solver=solver)).solver
+                       for solver in (Solver(), Solver(as_released=True, window=5)))
+    assert (printed.balance, printed.cycle.stop) == ("rigid", "residual")
+    assert (public.start, public.balance, public.cycle.stop) == ("gravity", "none", "load")
+    assert (printed.window, public.window) == (8, 5)

@@ -83,8 +83,20 @@ def test_steps_without_contact_refuse_it(head, message):
 
 
 def test_conditions_at_surfaces_act_on_each_field():
-    *_, last = simulate(build(loads('boundary = "surface"' + SCENE + CONTACT)))
-    assert last.state.step == 3
+    """Bodies far from each other fall on a floor between nodes, each as if it were alone."""
+    head = 'boundary = "surface"\n' + SCENE.replace("steps = 3", "steps = 40").replace(
+        "point = [0.0, 0.0]", "point = [0.0, -0.02]")
+    apart = head.replace("[0.4, 0.0]", "[2.4, 0.0]").replace("[0.8, 0.4]", "[2.8, 0.4]").replace(
+        "[0.8, 0.0]", "[4.8, 0.0]").replace("[1.2000000000000002, 0.4]", "[5.2, 0.4]")
+    *_, last = simulate(build(loads(apart + CONTACT)))
+    assert [len(body.particles.x) for body in last.state.bodies] == [64, 64, 64]
+    *_, one = simulate(build(loads(apart)))
+    *_, falling = simulate(build(loads(apart[:apart.index("[[collider]]")] + CONTACT)))
+    for body, same, free in zip(last.state.bodies, one.state.bodies, falling.state.bodies,
+                                strict=True):
+        v = same.particles.v
+        assert body.particles.v == pytest.approx(v, abs=1e-9 * np.abs(v).max())
+        assert np.abs(body.particles.v - free.particles.v).max() > 0.1
 
 
 def test_impulses_of_parts_are_those_of_all_bodies():

@@ -76,14 +76,18 @@ def test_bodies_that_stick_move_as_in_one_field(d, transfer):
             assert x == pytest.approx(y, abs=1e-11 * np.abs(y).max())
 
 
-def test_a_pair_without_contact_moves_as_one_beside_others():
-    """A third body, which no contact names, sticks to the others as ever."""
-    *_, third = run(with_third(disks()), 10)
-    assert third.particles.v[:, 0].max() > 0.2
+def test_bodies_whose_pair_has_no_contact_move_as_in_one_field():
+    """A disk that no contact names, on one that meets another later."""
+    ours, one = (run(with_third(disks(gap=4.0, contacts=c)), 20) for c in (TOUCH, ()))
+    assert ours[2].particles.v[:, 0].max() > 0.5
+    for a, b in zip(ours, one, strict=True):
+        for name in ("x", "v", "F"):
+            x, y = getattr(a.particles, name), getattr(b.particles, name)
+            assert x == pytest.approx(y, abs=1e-11 * np.abs(y).max())
 
 
-def with_third(problem, names=()):
-    """The problem with a third disk beside the left one."""
+def with_third(problem):
+    """The problem with a third disk on the left one."""
     center = problem.bodies[0].particles.x.mean(axis=0) + [0.0, 2.0 * RADIUS * DX]
     third = ball("third", center, JELLY, NoFlow(), transfer=problem.scheme.transfer)
     return replace(problem, bodies=(*problem.bodies, third))
@@ -124,14 +128,6 @@ def test_bodies_with_a_gap_of_half_a_cell_do_not_feel_each_other():
 def test_one_and_two_threads_give_the_same_bits(d):
     one, two = by_threads(lambda: digest(run(disks(d), 40)))
     assert one == two
-
-
-def test_three_bodies_in_contact_keep_momentum():
-    contacts = (BodyContact(("left", "right", "third"), 0.5),)
-    problem = with_third(replace(disks(), contacts=()))
-    bodies = run(replace(problem, contacts=contacts), 40)
-    assert momentum(bodies) == pytest.approx(0.0, abs=1e-12)
-    assert len({tuple(body.particles.v.mean(axis=0)) for body in bodies}) == 3
 
 
 # with conditions, and in runs
@@ -192,9 +188,37 @@ def test_contacts_that_do_not_fit_the_bodies_are_refused():
         disks(contacts=(*TOUCH, BodyContact(("right", "left"))))
     with pytest.raises(ValueError, match="degree = 1: expected 2 or 3"):
         disks(scheme=Scheme(1, "flip"))
+    with pytest.raises(ValueError, match=r"gimp = 11\.0: expected at most 10"):
+        disks(scheme=Scheme(transfer="flip", gimp=11.0))
+    with pytest.raises(ValueError, match=r"mass_eps = 0\.001: expected 0, since each"):
+        disks(scheme=Scheme(mass_eps=1e-3))
     stepper = ContactStepper((BodyContact(("left", "other")),), Scheme(), DX, np.zeros(2))
     with pytest.raises(ValueError, match="there is none of this name"):
         stepper.start(disks(scheme=Scheme()).bodies)
+
+
+def test_two_bodies_of_one_name_are_refused():
+    """A contact could not tell which it means; without one they pass."""
+    left, right = disks().bodies
+    bodies = left, right, right
+    with pytest.raises(ValueError, match="body 'right': two bodies have this name"):
+        replace(disks(), bodies=bodies)
+    stepper = ContactStepper(TOUCH, Scheme(transfer="apic"), DX, np.zeros(2))
+    with pytest.raises(ValueError, match="two bodies have this name"):
+        stepper.start(bodies)
+    assert replace(disks(contacts=()), bodies=bodies).contacts == ()
+
+
+def test_conditions_of_a_single_grid_are_refused():
+    """When the stepper is made, not in its first step; without contacts they serve."""
+    class Still:
+        def apply(self, grid, t, dt):
+            grid.v[:] = 0.0
+
+    with pytest.raises(ValueError, match="conditions Still with contacts of bodies: expected a "
+                                         "method apply_all"):
+        disks(conditions=Still()).stepper()
+    assert speeds(run(disks(conditions=Still(), contacts=()), 2)) == pytest.approx([0.0, 0.0])
 
 
 def test_implicit_steps_and_budgets_are_refused():

@@ -1,4 +1,6 @@
-"""Bodies that start in a collider, in a wall or in each other are warned of; touching ones not."""
+"""Bodies that start in a collider, in a wall or in each other are warned of; touching ones not, but
+for thin ones.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,6 +9,8 @@ import numpy as np
 import pytest
 from small_runs import DX, block, colliding
 
+from mpm_ref.body import particles_at
+from mpm_ref.body_contact import BodyContact
 from mpm_ref.core import motion
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed
 from mpm_ref.core.levelset import box, half_space
@@ -137,3 +141,46 @@ def test_compressed_particles_take_less_room():
     ids=lambda file: file.stem)
 def test_bundled_scenes_stand_well(file):
     assert misplaced(build(load(file))) == []
+
+
+# thin bodies in contact
+
+TOUCH = (BodyContact(("left", "plate")),)
+
+
+def with_plate(height, angle=0.0, contacts=TOUCH):
+    """The left block and a plate far from it, `height` cells thick and ten long, turned."""
+    x = DX * np.stack(np.meshgrid(np.arange(0.25, 10.0, 0.5), np.arange(0.25, height, 0.5)),
+                      axis=-1).reshape(-1, 2)
+    c, s = np.cos(angle), np.sin(angle)
+    V = np.full(len(x), 0.25 * DX**2)
+    particles = particles_at(x @ [[c, s], [-s, c]] + 3.0, np.zeros_like(x), 1e3 * V, V, "mls")
+    problem = left(None)
+    plate = problem.bodies[0]._replace(name="plate", particles=particles, id=np.arange(len(x)))
+    return replace(problem, bodies=(*problem.bodies, plate), contacts=contacts)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5])
+def test_thin_bodies_that_others_touch_are_warned_of(angle):
+    (sentence,) = misplaced(with_plate(1.5, angle))
+    assert sentence.startswith("body 'plate' is 1.5 dx thick, less than 2: contact measures gaps")
+    assert misplaced(with_plate(2.0, angle)) == []
+
+
+@pytest.mark.parametrize("contacts", [(), (BodyContact(("left", "plate"), kind="stick"),)])
+def test_thin_bodies_that_only_stick_are_not_warned_of(contacts):
+    assert misplaced(with_plate(0.5, contacts=contacts)) == []
+
+
+def test_a_single_particle_is_thin():
+    (sentence,) = misplaced(one_particle())
+    assert "body 'plate' is 0.5 dx thick" in sentence
+
+
+def one_particle():
+    """The left block, and a plate of one particle."""
+    problem = with_plate(0.5)
+    block, plate = problem.bodies
+    q = plate.particles
+    single = particles_at(q.x[:1], q.v[:1], q.m[:1], q.V0[:1], "mls")
+    return replace(problem, bodies=(block, plate._replace(particles=single, id=np.arange(1))))

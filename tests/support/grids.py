@@ -41,3 +41,14 @@ def floor(height, d, **options):
     """Half-space below a height along the last axis."""
     up = np.eye(d)[-1]
     return Collider(half_space(height * up, up), **options)
+
+
+def over(grid, a, box):
+    """Nodal values over a box, 0 where the grid has no node."""
+    out = np.zeros((*box.shape, *a.shape[grid.m.ndim:]))
+    low = np.maximum(grid.origin, box.first)
+    high = np.minimum(grid.origin + grid.m.shape, box.first + box.shape)
+    here, there = ((slice(*ends) for ends in zip(low - first, high - first, strict=True))
+                   for first in (box.first, grid.origin))
+    out[tuple(here)] = a[tuple(there)]
+    return out

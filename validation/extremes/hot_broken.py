@@ -25,6 +25,7 @@ BROKEN = ("inverted", "point inverted", "line", "flat", "zero", "tiny", "vanishi
 STRETCHED = (2.0, 3.0, 10.0)
 PARTICLE = 31                       # the one
 REBUILD = 5
+LONG = 3000         # iterations; the methods' own limit is 10000
 SCALE = "2D block of 6 x 6 cells, 144 particles (3D: 4 x 4 x 4, 512), one particle or all"
 
 
@@ -75,6 +76,13 @@ def broken_start(run):
     moduli = run.choose(quick=(1e6,), standard=(1e4, 1e6, 1e9))
     stopped = sweep(run, "broken", deformed_cases(run, BROKEN, moduli), "Newton is slow by the "
                     "projection: see extremes.hot.broken.curvature")
+    longer = [solve(setup, "hot-plus", max_iterations=LONG)
+              for setup, e in stopped if e.method == "hot-plus"]
+    run.record("extremes.hot.broken.hot-plus.longer", sum(e.kind != CONVERGED for e in longer),
+               paper=0, comparator="=",
+               scale=f"{len(longer)} solves that met the iteration limit above",
+               note=f"of these, how many do not converge in {LONG} iterations either; the most "
+                    f"that one takes: {max((e.iterations for e in longer), default=0)}")
     newton = [least_curvature(setup, e.method) for setup, e in stopped if e.method.startswith("pn")]
     run.record("extremes.hot.broken.curvature", min(newton, default=1.0), comparator="info",
                scale=f"{len(newton)} Newton solves that reached their cap",

@@ -43,8 +43,8 @@ from .incline import (
     V0,
     Slope,
     block_scene,
-    course,
     released,
+    trajectory,
 )
 from .lattice import body, lattice
 from .symplectic import distance_travelled
@@ -73,7 +73,7 @@ def implicit(problem, transfer, dt=DT):
                    solver=options_of(METHOD, eps=EPS))
 
 
-class Plane:
+class ImplicitPlane:
     """A plane and a transfer, its slides, and how their numbers are recorded."""
 
     def __init__(self, run, name, transfer, dx):
@@ -84,7 +84,7 @@ class Plane:
         """Return the slope of friction angle phi [degrees] and the slide on it."""
         slope = Slope(THETA, phi, self.tilted)
         problem = released(build(block_scene(slope, E, self.dx, sudden)), slope, v0)
-        return slope, course(implicit(problem, self.transfer), slope)
+        return slope, trajectory(implicit(problem, self.transfer), slope)
 
     def record(self, quantity, value, s, **rule):
         """Record a number of a slide."""
@@ -177,7 +177,7 @@ def implicit_friction(run):
     dx = run.choose(quick=0.05, standard=0.025)
     cases = [(name, transfer) for name in PLANES for transfer in TRANSFERS]
     for name, transfer in run.progress(run.choose(quick=cases[:1], standard=cases), "planes"):
-        Plane(run, name, transfer, dx).measure()
+        ImplicitPlane(run, name, transfer, dx).measure()
     rows = [row for transfer in TRANSFERS for row in sheared_block(run, transfer, dx)]
     pendulum(run, 2.0 * dx)
     run.table("dragged", ("transfer", "t", "along", "into"), rows)

@@ -151,10 +151,10 @@ def released(problem, slope, v0):
 def slide(slope, E, dx, v0=0.0, sudden=True):
     """Return the `Slide` of `DURATION` seconds from speed v0 [m/s]; E [Pa], spacing dx [m]."""
     problem = released(build(block_scene(slope, E, dx, sudden)), slope, v0)
-    return course(replace(problem, clock=Clock(end=DURATION, interval=DURATION / SHOWN)), slope)
+    return trajectory(replace(problem, clock=Clock(end=DURATION, interval=DURATION / SHOWN)), slope)
 
 
-def course(problem, slope):
+def trajectory(problem, slope):
     """Return the `Slide` of a problem of the block on a slope."""
     rows = []
     with threads_for(problem.bodies):

@@ -262,7 +262,7 @@ def record_cantilever(run, schemes):
 
 def record_mms(run):
     """Record the order of the manufactured solution between walls."""
-    cells, rows = run.choose(quick=(16, 32), standard=mms.CELLS), []
+    cells, rows = run.choose(quick=(16, 64), standard=mms.CELLS), []
     for scheme in run.progress(run.choose(quick=mms.SECOND_ORDER[1:], standard=mms.SECOND_ORDER),
                                "manufactured solutions"):
         for kind, conditions in BOUNDARIES.items():
