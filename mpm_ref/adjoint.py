@@ -10,7 +10,7 @@ runs of many steps, and is what one usually wants.
 
 import numpy as np
 
-from .core.adjoint import corotated
+from .core.adjoint import corotated, strain
 from .core.adjoint import deform as deform_adjoint
 from .core.adjoint.boundary import solve_adjoint
 from .core.adjoint.deform import DeformBars, DeformStep
@@ -157,8 +157,10 @@ def _driver(body):
         return deform_adjoint.fluid
     if not isinstance(body.flow, NoFlow):
         return deform_adjoint.plastic
-    is_corotated = corotated.fits(body.law, body.particles.x.shape[1])
-    return corotated.elastic if is_corotated else deform_adjoint.elastic
+    for by_blocks in (corotated, strain):
+        if by_blocks.fits(body.law, body.particles.x.shape[1]):
+            return by_blocks.elastic
+    return deform_adjoint.elastic
 
 
 def clip_adjoint(positions, bars, low, high):

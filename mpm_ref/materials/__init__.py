@@ -91,6 +91,7 @@ law.corotated.method(FixedCorotated, fixed_corotated.corotated)
 for _function in (principal.pk1_hat, principal.dpk1_hat, principal.pair):
     _function.method(YieldingHencky, getattr(yielding_hencky, _function.__name__))
 law.kirchhoff_of_strain.method(Hencky, hencky.kirchhoff_of_strain)
+law.strain_moduli.method(Hencky, hencky.strain_moduli)
 law.pressure.method(Fluid, fluid.pressure)
 law.d_pressure.method(Fluid, fluid.d_pressure)
 law.psi_volume.method(Fluid, fluid.psi_volume)

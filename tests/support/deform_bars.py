@@ -13,7 +13,7 @@ from constitutive import LAW, rate, rotations, transpose
 from flows import CASES, setting
 
 from mpm_ref.core import deform
-from mpm_ref.core.adjoint import corotated
+from mpm_ref.core.adjoint import corotated, strain
 from mpm_ref.core.adjoint import deform as adjoint
 from mpm_ref.core.adjoint.deform import DeformBars, DeformStep
 from mpm_ref.core.jit import CHUNKS
@@ -121,12 +121,17 @@ def gradients(q, law, flow):
         if q.F.ndim == 1:
             adjoint.fluid_vjp(step, bars, law, like, c)
         elif isinstance(flow, NoFlow):
-            by_blocks = corotated.fits(law, len(like))
-            run = corotated.elastic_blocks if by_blocks else adjoint.elastic_vjp
-            run(step, bars, law, like, c)
+            serial_elastic(law, len(like))(step, bars, law, like, c)
         else:
             adjoint.plastic_vjp(step, bars, law, flow, like, c)
     return named(bars, step.sums, law, flow)
+
+
+def serial_elastic(law, d):
+    """The loop over a chunk that differentiates a law without a flow."""
+    if corotated.fits(law, d):
+        return corotated.elastic_blocks
+    return strain.elastic_strain_blocks if strain.fits(law, d) else adjoint.elastic_vjp
 
 
 def loss_at_start(q, law, flow):

@@ -75,6 +75,18 @@ def cofactors(A, C, n):
 
 
 @kernel
+def add_symmetrized(S, D, n):
+    """D = D + S + S^T."""
+    for k in range(n):
+        xy, xz, yz = S[k + _1] + S[k + _3], S[k + _2] + S[k + _6], S[k + _5] + S[k + _7]
+        D[k] += 2.0 * S[k]
+        D[k + _4] += 2.0 * S[k + _4]
+        D[k + _8] += 2.0 * S[k + _8]
+        D[k + _1], D[k + _2], D[k + _5] = D[k + _1] + xy, D[k + _2] + xz, D[k + _5] + yz
+        D[k + _3], D[k + _6], D[k + _7] = D[k + _3] + xy, D[k + _6] + xz, D[k + _7] + yz
+
+
+@kernel
 def symmetrize(A, n):
     """A = (A + A^T)/2."""
     for k in range(n):

@@ -18,24 +18,21 @@ from ..corotated import BLOCK, sums_of_singular
 from ..jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from ..law import corotated, units
 from ..spectral import FAR_FROM_SINGULAR, product_of_sums
-from ..tensor import mat, mlin
+from .block_steps import fall_back, load, store
 from .blocks import (
     axial_vectors,
     cofactors,
     combinations,
     determinants,
-    entries,
     inner_products,
     plus_skew,
     products,
     products_transposed,
-    put_entries,
     solve,
     symmetrize,
     traces,
     traces_less,
 )
-from .deform import principal_bar, put_trial_bar, trial
 
 TINY, HUGE = 1e-50, 1e50        # |F|^2 of an F whose fourth powers lose no digits
 
@@ -70,17 +67,10 @@ def elastic_blocks(step, bars, law, like, c):
         load(step, bars, like, bounds, block.F, block.T)
         decompose(block, bounds[1] - first)
         pull_stress(block, law, bounds[1] - first)
-        fall_back(block, law, step.sums, c, bounds[1] - first)
+        fall_back((block.F, block.T), (block.R, block.of_law, block.fits), law, (step.sums, c),
+                  bounds[1] - first)
         add_moduli(block, law, step.sums, c, bounds[1] - first)
         store(step, bars, like, bounds, block.R)
-
-
-@kernel
-def load(step, bars, like, bounds, F, T):
-    """F of the step and tau_bar of a block."""
-    for p in range(bounds[0], bounds[1]):
-        put_entries(trial(step, p, like), p - bounds[0], F)
-        put_entries(mat(bars.tau, p, like), p - bounds[0], T)
 
 
 @kernel
@@ -151,16 +141,6 @@ def stress_factors(invariants, of_law, law, factors, n):
 
 
 @kernel
-def fall_back(block, law, sums, c, n):
-    """The bars of F and of the moduli in singular values, where R and V lose digits."""
-    F, R, T, fits, of_law = block.F, block.R, block.T, block.fits, block.of_law
-    for k in range(n):
-        if fits[k] == 0.0:
-            put_entries(principal_bar(entries(F, k), entries(T, k), law, sums, c), k, R)
-            of_law[0, k], of_law[1, k] = 0.0, 0.0
-
-
-@kernel
 def add_moduli(block, law, sums, c, n):
     """Add the bars of the moduli, from those of a and p(J), to the sums of chunk c."""
     J, of_law, alone = block.invariants[2], block.of_law, units(law)
@@ -170,14 +150,6 @@ def add_moduli(block, law, sums, c, n):
             a, p, _ = corotated(J[k], alone[i])
             total += a * of_law[0, k] + p * of_law[1, k]
         sums[c, i] = total
-
-
-@kernel
-def store(step, bars, like, bounds, F_bar):
-    """The bars of the state before the step."""
-    for p in range(bounds[0], bounds[1]):
-        of_stress = entries(F_bar, p - bounds[0])
-        put_trial_bar(step, bars, p, mlin(1.0, mat(bars.F, p, like), 1.0, of_stress), like)
 
 
 def fits(law, d):
