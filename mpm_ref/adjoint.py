@@ -139,9 +139,9 @@ def require_adjoint(body):
 
 def deform_body_adjoint(body, L, bar, parts, dt, one_gradient=False):
     """Apply the adjoint of `explicit.deform_body` with velocity gradient L: bar.F and bar.y of the
-    values after the step become those before it, and bar.L is overwritten, or with one_gradient
-    left, and what it would be added to bar.C; bar.tau is read. L may be the array of bar.L. Raises
-    ValueError for a law or a flow without adjoint.
+    values after the step become those before it, and bar.L is overwritten; with one_gradient bar.L
+    is left, and the bar of L is added to bar.C. bar.tau is read. L may be the array of bar.L.
+    Raises ValueError for a law or a flow without adjoint.
     """
     require_adjoint(body)
     q, law, flow = body.particles, body.law, body.flow

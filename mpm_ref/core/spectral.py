@@ -72,19 +72,12 @@ def polar(F):
 @kernel
 def rotation(F):
     """R of `polar` to round-off; three times as fast where F is far from singular and inverted."""
-    R, ok = rotation_without_svd(F)
-    if ok:
-        return R
+    if is_moderate(F):
+        R, ok = _fast_rotation(F)
+        if ok:
+            return R
     U, _, V, _ = svd(F)
     return mmt(U, V)
-
-
-@kernel
-def rotation_without_svd(F):
-    """`rotation` and True, or anything and False: F is close to singular, inverted, huge, tiny."""
-    if is_moderate(F):
-        return _fast_rotation(F)
-    return F, False
 
 
 @kernel

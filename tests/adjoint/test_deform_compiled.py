@@ -4,10 +4,12 @@ as torch's automatic differentiation of the formulas.
 
 import numpy as np
 import pytest
-from deform_bars import DT, apart, materials, named, seeds, states
+from deform_bars import DT, apart, materials, matter, named, seeds, states
 from problems import run_python
 from threads import MOST, by_threads
 
+from mpm_ref.adjoint import deform_body_adjoint
+from mpm_ref.body import Body
 from mpm_ref.core.adjoint import corotated, deform, strain
 from mpm_ref.core.corotated import BLOCK
 from mpm_ref.core.jit import CHUNKS
@@ -99,7 +101,7 @@ def test_without_singular_values_as_with_them(law, n):
     assert max(apart(*found).values()) < 1e-13
 
 
-@pytest.mark.parametrize("size", [0.003, 0.1, 0.39, 0.41])
+@pytest.mark.parametrize("size", [0.003, 0.1, 0.39, 0.41, 0.59])
 def test_derivative_of_a_strain_of_any_size(size):
     """On both sides of the size from which singular values are used: to round-off of both."""
     law, rng = Hencky(300.0, 500.0), np.random.default_rng(8)
@@ -111,6 +113,15 @@ def test_derivative_of_a_strain_of_any_size(size):
         module.elastic(step, bars, law)
         found.append(bars)
     assert np.abs(found[0].F - found[1].F).max() < 1e-14 * np.abs(found[1].F).max()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_body_is_differentiated_by_the_loop_of_its_material(name):
+    q, (law, flow, _) = scattered(name), materials(CASES[name])[name]
+    bars, step, _ = seeds(q, law, flow)
+    body = Body("body", matter(q), law, flow, np.arange(N))
+    deform_body_adjoint(body, q.L, bars, step.sums, DT)
+    assert bits(bars, step.sums) == bits(*driven(name))
 
 
 @pytest.mark.parametrize("name", BLOCKS)

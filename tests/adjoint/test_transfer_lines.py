@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
-from adjoints import DT, direction, g2p_bars, how_of, like_grid, p2g_bars, zeros
+from adjoints import DT, direction, g2p_bars, how_of, like_grid
 from clouds import DX, EVERY, SHARE, Case, cloud, deep, scattered
 from problems import run_python
 
-from mpm_ref.core.adjoint.records import packed_velocities
+from mpm_ref.core.adjoint.records import packed_bars, packed_velocities
 from mpm_ref.core.adjoint.shape_gradient import GradientForm, MlsForm
 from mpm_ref.core.adjoint.transfer import (
     gather_bars,
+    p2g_adjoint,
     relaxation_bars,
     scatter_bars,
     velocity_gradients,
@@ -48,13 +49,20 @@ def copy(q):
     return Particles(*(a.copy() for a in q))
 
 
-def plain_p2g(case, q, nodes):
-    """Bars of particles by `gather_bars`."""
-    bars = zeros(q)
+def plain_p2g(case, q, nodes, before):
+    """Bars of particles by `gather_bars`, from those before."""
+    bars = copy(before)
     form = GradientForm(DT)
     if case.transfer == "mls":
         form = MlsForm(DT, inverse_inertia(DX, case.stencil))
     gather_bars(q, nodes, bars, case.stencil, form, (0, len(q.x)))
+    return bars
+
+
+def fast_p2g(case, q, nodes, before):
+    """The same by `p2g_adjoint`."""
+    bars = copy(before)
+    p2g_adjoint(q, packed_bars(nodes), bars, how_of(case))
     return bars
 
 
@@ -81,10 +89,10 @@ def apart(case, n=60):
     q.tau[:] += rng.normal(size=q.tau.shape)                # not symmetric, where it is full
     q.x[0] = DX * np.rint(q.x[0] / DX)
     nodes = like_grid(scattered(case, q, DT), rng)
-    seeds = direction(q, rng, SEEDS)
+    seeds, before = direction(q, rng, SEEDS), direction(q, rng, Particles._fields)
     bars, of_nodes = g2p_bars(case, q, nodes, seeds)
     of_q, plain_nodes = plain_g2p(case, q, nodes, seeds)
-    return (largest(p2g_bars(case, q, nodes), plain_p2g(case, q, nodes)),
+    return (largest(fast_p2g(case, q, nodes, before), plain_p2g(case, q, nodes, before)),
             largest((bars.x, bars.v), of_q),
             largest((of_nodes.v, of_nodes.v_old), plain_nodes))
 
