@@ -122,15 +122,44 @@ def features(
 
 
 @app.command()
-def scaling(repeats: int = 9, out: Path = Path("results/benchmarks/scaling.json")):
-    """Measure the fixed cost of a step, and the parallel share of its phases on two threads."""
-    from .scaling import shares, sizes
+def scaling(
+    repeats: int = 9,
+    threads: Annotated[str, typer.Option(help="numbers of threads, comma-separated")] = "1,2",
+    out: Path = Path("results/benchmarks/scaling.json"),
+):
+    """Measure the fixed cost of a step, the parallel share of its phases on two threads, and steps
+    on some numbers of threads.
+    """
+    from .scaling import by_threads, shares, sizes
 
+    numbers = [int(n) for n in threads.split(",")]
     rows = sizes(repeats) + shares(repeats)
+    for size in ("100k", "1M"):
+        rows += by_threads(CELLS[size], numbers, repeats)
     for row in rows:
         typer.echo("  ".join(f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
                              for key, value in row.items()))
-    save(out, rows, 2, repeats)
+    save(out, rows, max(numbers), repeats)
+
+
+@app.command()
+def printed(
+    scenes: Annotated[str, typer.Argument(help="scene files, or names such as faceless, at the "
+                                          "size that the paper prints, comma-separated")],
+    threads: Annotated[str, typer.Option(help="numbers of threads, comma-separated")] = "2",
+    seconds: Annotated[float, typer.Option(help="wall time of the first of them")] = 600.0,
+    method: str = "hot",
+    out: Path = Path("results/benchmarks/printed.json"),
+):
+    """Measure the first implicit steps of HOT's scenes at the printed size, and their memory."""
+    from .printed import costs
+
+    numbers = [int(n) for n in threads.split(",")]
+    rows = costs(scenes.split(","), numbers, seconds, method)
+    for row in rows:
+        typer.echo("  ".join(f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
+                             for key, value in row.items()))
+    save(out, rows, max(numbers), 1)
 
 
 @app.command()

@@ -2,7 +2,8 @@
 
 The fixed cost is the time of a step of no particles, by a line through the times of small blocks.
 The parallel share f of a phase follows from Amdahl's law and its times on one and on two threads,
-T_2 = T_1 (1 - f/2): on n threads it takes T_1 (1 - f + f/n).
+T_2 = T_1 (1 - f/2): on n threads it takes T_1 (1 - f + f/n). Where a computer has more cores, steps
+are timed on them.
 """
 
 import time
@@ -74,6 +75,25 @@ def shares(repeats):
     one, two = (scale * np.median(times[1:], axis=0) for times in found.values())
     names = ("order and p2g", "grid update", "g2p", "deform", "step")
     return [phase_row(*row) for row in zip(names, (*one, one.sum()), (*two, two.sum()))]
+
+
+def by_threads(cells, numbers, repeats):
+    """Return a row for each number of threads: median wall and CPU ns per particle-step of a block
+    with so many cells along an axis, and the speed-up over the first number.
+    """
+    run, found = Run(MLS, block(cells)), {n: [] for n in numbers}
+    particles = len(run.bodies[0].id)
+    steps = max(1, 300_000 // particles)
+    for _ in range(repeats + 1):
+        for n, times in found.items():
+            jit.set_threads(n)
+            run.step()                          # wakes the threads
+            times.append(per_step(run, steps))
+    scale = 1e3 / particles
+    medians = {n: scale * np.median(times[1:], axis=0) for n, times in found.items()}
+    first = medians[numbers[0]][0]
+    return [{"particles": particles, "threads": n, "wall_ns": float(wall), "cpu_ns": float(cpu),
+             "speedup": float(first / wall)} for n, (wall, cpu) in medians.items()]
 
 
 def phases(run):

@@ -23,7 +23,7 @@ from ..sweep.store import RunStore
 from .catalogue import find_scene
 from .errors import options
 from .options import make_folder, on_interrupt
-from .terminal import passing
+from .terminal import passing, warn
 
 UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 TIMES = 33              # at which quantities are sampled, the start and the end included
@@ -154,7 +154,8 @@ def open_runs(request, observed):
         bar = stack.enter_context(passing(
             request.quiet, total=request.budget, unit="s", desc=request.stem,
             bar_format="{desc} {bar}| {postfix} [{elapsed}]"))
-        runs = SceneRuns(observed, executor, RunStore(folder), request.budget)
+        store = RunStore(folder)
+        before, runs = store.count(), SceneRuns(observed, executor, store, request.budget)
         stack.enter_context(on_interrupt(lambda: f"after {runs.count} runs, which are stored in "
                                          f"{folder}; the same command goes on"))
 
@@ -165,3 +166,6 @@ def open_runs(request, observed):
 
         runs.on_run = show
         yield runs
+    if before and not runs.reused:
+        warn([f"none of the {counted(before, 'run')} in {folder} could be used: they are of "
+              "another scene, list of quantities or version of the package"])

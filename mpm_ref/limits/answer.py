@@ -6,12 +6,13 @@ from math import inf, isfinite, log10
 
 from .. import __version__
 from ..scene import digest
+from ..store.text import counted
 from ..sweep.observation import REFUSED, STOPPED
 from .axes import AXIS, LEAST_NU, MOST_LONGER, UP
 from .cause import RESOLUTION, SETTING, VANISHING, limit_counts
 from .cell import cell_of, cell_text
 from .search import NARROW
-from .verdict import LOST, RIGHT, SLACK, UNCHECKED, WRONG
+from .verdict import AT_COARSE, LOST, RIGHT, SLACK, UNCHECKED, WRONG
 
 MARGIN, TOO_LONG, NOT_CHECKED, BUDGET_END, LAST_RUNG = (
     "failure", "too long", "not checked", "budget", "not tried farther")
@@ -25,8 +26,9 @@ def answer_of(search, scene, name):
     """Return the answer as plain data; errors are relative, times in s.
 
     Axes are changed by factors; each direction has its margin, what ended it (`end`) and the first
-    bad cell. Cells that finished with a wrong result come first, with the warnings that
-    `mpm-ref run` gives of them, and `limits` counts these cells by warning or limit.
+    bad cell; `compared_with` names what its last good factor was compared with. Cells that
+    finished with a wrong result come first, with the warnings that `mpm-ref run` gives of them, and
+    `limits` counts these cells by warning or limit.
     """
     judge, scenes = search.judge, search.judge.scenes
     wrong = sorted(search.wrong_cells().items(), key=lambda item: distance(item[0]))
@@ -38,6 +40,7 @@ def answer_of(search, scene, name):
         "end": scene.end, "error": judge.error, "quantities": list(judge.quantities),
         "tolerance": dict(judge.tolerance), "slack": SLACK, "most_longer": MOST_LONGER,
         "narrow": NARROW, "size": scenes.size, "base": {"outcome": base.outcome, **vars(base.cost)},
+        "warnings": list(base.warnings),
         "wrong": wrong, "limits": limit_counts(wrong),
         "nearest": nearest(directions), "directions": directions, "left_out": search.left_out,
         "maps": [map_facts(one) for one in search.maps],
@@ -66,13 +69,20 @@ def direction_facts(one, judge):
     facts = {
         "axis": name, "text": one.axis.text, "direction": one.direction, "margin": one.margin,
         "verb": "grow" if (one.direction == UP) != one.axis.is_inverse else "fall",
-        "good": one.good, "bad": bad, "end": end_of(one), "now": value(one, scenes, 1.0),
+        "good": one.good, "compared_with": compared_with(one, judge), "bad": bad,
+        "end": end_of(one), "now": value(one, scenes, 1.0),
         "good_value": value(one, scenes, one.good),
         "bad_value": None if bad is None else value(one, scenes, bad),
         "first_bad": None if bad is None else cell_facts(cell_of({name: bad}), one.verdict),
         "late": one.late, "late_value": None if one.late is None else value(one, scenes, one.late),
         "late_cell": None if late is None else cell_facts(cell_of({name: one.late}), late)}
     return facts | {"sentence": sentence(facts)}
+
+
+def compared_with(one, judge):
+    """Return what the farthest right cell of a direction was compared with, in words."""
+    verdict = judge.verdicts.get(cell_of({one.axis.name: one.good}))
+    return "" if verdict is None else verdict.reference
 
 
 def value(one, scenes, factor):
@@ -93,13 +103,14 @@ def end_of(one):
 
 
 def nearest(directions):
-    """Return the facts of the direction with the least margin to a failure, or None. A refusal,
+    """Return the facts of the direction whose first bad factor is nearest to 1, or None. A refusal,
     which warns before the run, a lost contact and a vanishing quantity count where nothing else
     fails.
     """
     failing = [one for one in directions if one["bad"] is not None
                and one["first_bad"]["outcome"] not in (STOPPED, UNCHECKED)]
-    return min(failing, key=lambda one: (is_milder(one["first_bad"]), one["margin"]), default=None)
+    return min(failing, key=lambda one: (is_milder(one["first_bad"]), abs(log10(one["bad"]))),
+               default=None)
 
 
 def is_milder(cell):
@@ -120,9 +131,20 @@ def map_facts(one):
 
 def answer_lines(facts):
     """Return the answer as lines of text."""
-    lines = [*wrong_lines(facts), "", *nearest_lines(facts), "", *tolerance_lines(facts), ""]
-    lines += [one["sentence"] for one in facts["directions"]]
-    return [*lines, *left_out_lines(facts), "", *map_lines(facts), *budget_lines(facts)]
+    return [*base_lines(facts), *wrong_lines(facts), "", *nearest_lines(facts), "",
+            *tolerance_lines(facts), "", *(one["sentence"] for one in facts["directions"]),
+            *left_out_lines(facts), "", *map_lines(facts), *budget_lines(facts)]
+
+
+def base_lines(facts):
+    """Return the warnings of the scene as given, and how many right cells have warnings."""
+    lines = [f"warning: the scene as given: {text}" for text in facts["warnings"]]
+    warned = [one for one in facts["cells"] if one["outcome"] == RIGHT and one["factors"]
+              and one["warnings"]]
+    if warned:
+        lines.append(f"right with a warning of the run: {counted(len(warned), 'cell')}, such as "
+                     f"{warned[0]['text']}: {warned[0]['warnings'][0]}")
+    return lines
 
 
 def wrong_lines(facts):
@@ -136,7 +158,7 @@ def wrong_lines(facts):
              f"{counts_text(facts['limits'])}"]
     for one in cells[:SHOWN_WRONG]:
         notice = f"; warning: {one['warnings'][0]}" if one["warnings"] else ""
-        lines.append(f"  {one['text']}: {wrong_text(one)}{notice}")
+        lines.append(f"  {one['text']} {wrong_text(one)}{notice}")
     if len(cells) > SHOWN_WRONG:
         lines.append(f"  {len(cells) - SHOWN_WRONG} more stand in the JSON")
     return lines
@@ -151,10 +173,10 @@ def wrong_text(cell):
     """Return the limit that a wrong cell met, with its error beside its tolerance."""
     if cell["limit"] == VANISHING:
         off = percent(cell["share"] * cell["error"])
-        return (f"by {VANISHING}: {cell['quantity']} nearly vanishes here (at dx/2 it has "
+        return (f"({VANISHING}): {cell['quantity']} nearly vanishes here (at dx/2 it has "
                 f"{percent(cell['share'])} of its change in the scene as given), so that its "
                 f"relative error means little: it is {off} of that change off")
-    return (f"by {cell['limit']}, {percent(cell['error'])} off in {cell['quantity']} (tolerance "
+    return (f"({cell['limit']}): {percent(cell['error'])} off in {cell['quantity']} (tolerance "
             f"{percent(cell['tolerance'])}), beside {cell['reference']}{coarse_text(cell)}")
 
 
@@ -183,7 +205,8 @@ def sentence(facts):
         within = " within the budget" if is_late else ""
         return (f"{text} {changed_by(facts, 'bad')}: {reason(facts['first_bad'])} (nothing nearer "
                 f"was tried{within})")
-    begin = f"{text} may {extent(facts)}"
+    by = f" (compared with {AT_COARSE} alone)" if facts["compared_with"] == AT_COARSE else ""
+    begin = f"{text} may {extent(facts)}{by}"
     if facts["bad"] is None and is_late:
         return f"{begin};{late_text(facts)}"
     if facts["bad"] is None:

@@ -234,12 +234,15 @@ def first(tables, part, keys):
 
 
 def speed_reading(tables):
-    """Return the largest initial speed, or that parts move; "" where nothing is driven."""
-    speeds = [np.linalg.norm(body["velocity"].get(key) or 0.0) for body in tables["body"]
-              for key in ("linear", "angular")]
-    if max(speeds) > 0.0:
-        return f"speed {max(speeds):.6g}"
-    return "parts move" if schedules(tables) else ""
+    """Return the largest initial linear and angular speeds that are not zero, or that parts move;
+    "" where nothing is driven.
+    """
+    texts = []
+    for key, unit in (("linear", "m/s"), ("angular", "rad/s")):
+        u = max(np.linalg.norm(body["velocity"].get(key) or 0.0) for body in tables["body"])
+        if u > 0.0:
+            texts.append(f"{key} speed {u:.6g} {unit}")
+    return ", ".join(texts) or ("parts move" if schedules(tables) else "")
 
 
 def gravity_reading(tables):

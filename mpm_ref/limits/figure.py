@@ -7,14 +7,14 @@ from math import log10
 
 from ..store.atomic import replacing
 from ..store.text import figure_text
-from ..sweep.observation import CRASHED, REFUSED, STOPPED, UNSTABLE
+from ..sweep.observation import CRASHED, REFUSED, STOPPED, TORN, UNSTABLE
 from .answer import BUDGET_END, LAST_RUNG, counts_text, number
 from .axes import UP
 from .verdict import LOST, RIGHT, UNCHECKED, WRONG
 
-COLOURS = {RIGHT: "#4c9f70", WRONG: "#c0392b", LOST: "#3b7fb5", UNSTABLE: "#e08e2b",
-           REFUSED: "#7a6fb0", STOPPED: "#9aa5b1", UNCHECKED: "#cfd6dd", CRASHED: "#222222",
-           None: "white"}
+COLOURS = {RIGHT: "#4c9f70", WRONG: "#c0392b", LOST: "#3b7fb5", TORN: "#b8864b",
+           UNSTABLE: "#e08e2b", REFUSED: "#7a6fb0", STOPPED: "#9aa5b1", UNCHECKED: "#cfd6dd",
+           CRASHED: "#222222", None: "white"}
 NAMES = {WRONG: "finished and wrong", None: "not run"}      # of outcomes in the legend
 SIGNS = {BUDGET_END: (" ?", "the budget ended the search"),
          LAST_RUNG: (" +", "not tried farther")}        # after the margin of a bar, by its end

@@ -1,9 +1,10 @@
 """The facts of the page of an answer: those of `answer.answer_of`, with words and colours."""
 
-from ..sweep.observation import CRASHED, REFUSED, STOPPED, UNSTABLE
+from ..sweep.observation import CRASHED, REFUSED, STOPPED, TORN, UNSTABLE
 from .answer import (
     BUDGET_END,
     LAST_RUNG,
+    base_lines,
     budget_lines,
     left_out_lines,
     map_lines,
@@ -15,7 +16,7 @@ from .answer import (
 from .figure import COLOURS, DECADES, NAMES
 from .verdict import LOST, RIGHT, UNCHECKED, WRONG
 
-MARKS = {RIGHT: "✓", WRONG: "W", LOST: "L", UNSTABLE: "U", REFUSED: "R", STOPPED: "T",
+MARKS = {RIGHT: "✓", WRONG: "W", LOST: "L", TORN: "F", UNSTABLE: "U", REFUSED: "R", STOPPED: "T",
          UNCHECKED: "?", CRASHED: "C", None: "·"}       # of outcomes, beside their colours
 ENDS = {LAST_RUNG: (RIGHT, "right as far as was tried"),
         BUDGET_END: (None, "the budget ended the search")}      # of directions without a failure
@@ -31,7 +32,7 @@ def page_facts(facts):
         "directions": [one | ending(one) for one in facts["directions"]],
         "maps": [one | {"line": line} for one, line in maps],
         "nearest_lines": nearest_lines(facts), "wrong_lines": wrong_lines(facts),
-        "tolerance_lines": tolerance_lines(facts),
+        "tolerance_lines": [*base_lines(facts), *tolerance_lines(facts)],
         "lines": [*left_out_lines(facts), *budget_lines(facts)],
     }
 

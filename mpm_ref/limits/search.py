@@ -141,7 +141,7 @@ class LimitsSearch:
         self.maps = []
 
     def run(self):
-        """Search along all directions, then on the pairs of the axes with the least margins."""
+        """Search along all directions, then on the pairs of the axes with the nearest failures."""
         explore(self.directions, self.judge.judge, self.judge.runs.workers)
         for pair in combinations(nearest_axes(self.directions), 2):
             self.maps.append(self._mapped(pair))
@@ -212,14 +212,15 @@ def confirm(directions, judge):
 
 
 def nearest_axes(directions, most=WIDEST):
-    """Return the axes with the least margins to a failure, nearest first, at most so many."""
-    margins = {}
+    """Return the axes with the nearest bad factors, nearest first, at most so many."""
+    distances = {}
     for one in directions:
         if one.failed:
-            margins.setdefault(one.axis.name, (inf, one.axis))
-            margins[one.axis.name] = min(margins[one.axis.name], (one.margin, one.axis),
+            distances.setdefault(one.axis.name, (inf, one.axis))
+            distances[one.axis.name] = min(distances[one.axis.name],
+                                           (abs(log10(one.bad)), one.axis),
                                          key=lambda pair: pair[0])
-    return [axis for _, axis in sorted(margins.values(), key=lambda pair: pair[0])][:most]
+    return [axis for _, axis in sorted(distances.values(), key=lambda pair: pair[0])][:most]
 
 
 def map_factors(directions):

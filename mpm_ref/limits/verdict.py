@@ -21,6 +21,8 @@ quantity, or with "@end" the last one, relative to its largest change during the
   run.
 * A cell that changes the physical problem and has no contact that the scene as given has is another
   scene, whether it is right or wrong: its contact is lost.
+* A cell whose run, or the one at dx/2 that decides, tears an elastic body (`indicators`) is torn,
+  whatever it differs by, unless the scene as given tears one too.
 * A cell is not checked where its run at dx/2 does not finish.
 * A run is too long if it takes more than `MOST_LONGER` times the CPU time of the scene as given, on
   the grid of that run. Runs that the budget ended have no verdict.
@@ -32,7 +34,7 @@ from math import isfinite
 import numpy as np
 
 from ..sweep.difference import largest_change, relative_difference
-from ..sweep.observation import CRASHED, REFUSED, STOPPED, UNSTABLE
+from ..sweep.observation import CRASHED, REFUSED, STOPPED, TORN, UNSTABLE
 from ..sweep.quantity import OutputQuantity
 from ..sweep.runs import RunRequest
 from .axes import AXIS, MOST_LONGER
@@ -40,7 +42,7 @@ from .cause import VANISHING, limit_of, vanishes
 from .cell import COARSE, FINE, CellScenes, cell_text, physical
 
 RIGHT, WRONG, UNCHECKED, LOST = "right", "wrong", "not checked", "contact lost"
-OUTCOMES = (RIGHT, WRONG, UNCHECKED, LOST, UNSTABLE, REFUSED, STOPPED, CRASHED)
+OUTCOMES = (RIGHT, WRONG, UNCHECKED, LOST, TORN, UNSTABLE, REFUSED, STOPPED, CRASHED)
 SLACK = 2.0             # times the scene's own difference from its refinement
 LEAST_CPU = 2.0         # [s] that any run may take
 BUDGET = 0.9            # of the CPU time allowed, below which a stopped run was stopped early
@@ -144,7 +146,7 @@ class CellJudge:
         for cell in new:
             if not runs[cell].finished:
                 self._note(cell, self._unfinished(runs[cell], self._most(1.0)))
-        stages = [self._by_contacts, self._by_the_scene, self._by_coarse_grids,
+        stages = [self._by_tears, self._by_contacts, self._by_the_scene, self._by_coarse_grids,
                   self._by_fine_grids]
         if by_fine_grids:
             stages.remove(self._by_coarse_grids)
@@ -176,6 +178,14 @@ class CellJudge:
 
     # what the verdicts rest on; each returns those that it can give
 
+    def _by_tears(self, runs):
+        """Return the verdicts on cells whose runs tear a body."""
+        return {cell: torn_verdict(run, run.tear) for cell, run in runs.items() if self._tears(run)}
+
+    def _tears(self, run):
+        """Return whether a run tears a body, and those of the scene as given do not."""
+        return bool(run.tear) and not any(one.tear for one in self.base.values())
+
     def _by_contacts(self, runs):
         """Return the verdicts on cells with a physical change that lost a contact of the scene as
         given.
@@ -202,7 +212,7 @@ class CellJudge:
         runs = {cell: run for cell, run in runs.items() if physical(cell) == cell}
         coarse = self._companions(runs, COARSE)
         verdicts = {cell: self._compared(run, coarse[cell], cell, AT_COARSE)
-                    for cell, run in runs.items()}
+                    for cell, run in runs.items() if not self._tears(coarse[cell])}
         self.coarse |= verdicts
         return {cell: verdict for cell, verdict in verdicts.items() if verdict.is_right}
 
@@ -212,7 +222,9 @@ class CellJudge:
         fine, verdicts = self._companions(cheapest_first, FINE), {}
         for cell, run in runs.items():
             reference = fine[physical(cell)]
-            if reference.finished:
+            if self._tears(reference):
+                verdicts[cell] = torn_verdict(run, f"at dx/2: {reference.tear}")
+            elif reference.finished:
                 verdicts[cell] = self._compared(run, reference, cell, AT_FINE)
             else:
                 verdicts[cell] = self._unchecked(run, reference)
@@ -311,6 +323,12 @@ class CellJudge:
         """
         values = reference.values[text]
         return largest_change(values if values.any() else self.base[FINE].values[text])
+
+
+def torn_verdict(run, sentence):
+    """Return the verdict on a run with the sentence on the body that tore."""
+    return CellVerdict(TORN, sentence, cpu=run.cost.cpu, steps=run.cost.steps, until=run.until,
+                       warnings=run.warnings)
 
 
 def differences(values, reference, shifted, scale=None):

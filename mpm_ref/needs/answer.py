@@ -56,6 +56,7 @@ class NeedsAnswer:
             **code(),
             "error": self.error,
             "quantities": list(result.base.values),
+            "warnings": list(result.base.warnings),
             "given": asdict(result.base.cost) | {"cpu": result.cpu, "noise": result.noise},
             "errors": asdict(result.errors),
             "removals": [run_facts(run, result) | {"text": removal_line(run, self),
@@ -83,7 +84,8 @@ def changed_text(changes):
 def scene_lines(result):
     """Return lines on the scene as given: its cost and its errors."""
     scene, cost, errors = result.first.scene, result.base.cost, result.errors
-    lines = [f"{scene.title or 'scene'}: {cost.particles} particles, {cost.steps} steps, "
+    lines = [f"warning: the scene as given: {text}" for text in result.base.warnings]
+    lines += [f"{scene.title or 'scene'}: {cost.particles} particles, {cost.steps} steps, "
              f"{result.cpu:.3g} s of CPU time (equal runs differ by {percent(result.noise)})"]
     if errors.perturbation:
         lines.append(f"a perturbation by 1e-10 cells changes {changed_text(errors.perturbation)}")

@@ -39,6 +39,11 @@ STAGES = {          # of a step: beginnings of the names of the kernels that it 
     "return map": ("core.deform.plastic", "core.deform.radial", "core.deform.full"),
     "RPIC damping": ("core.transfer._damp",),
 }
+MEANINGS = {        # of the fields of particles, as `core.state` has them
+    "x": "position", "v": "velocity", "C": "affine velocity", "L": "velocity gradient, if not C",
+    "F": "deformation gradient or J", "tau": "stress", "m": "mass", "V0": "volume at rest",
+    "y": "yield stress", "b": "body force",
+}
 LONGEST = 600       # [s] that the first steps may take
 
 
@@ -80,12 +85,13 @@ def table_rows(parts):
     columns = list(parts.values())
     if not columns:
         return []
-    rows = [("in the first steps", [str(column.steps) for column in columns])]
+    rows = [("number of first steps", [str(column.steps) for column in columns])]
     for bodies in alike_bodies(columns[0]):
         rows.append((f"bytes per particle of {', '.join(bodies)}", []))
         fields = columns[0].numbers[bodies[0]]
         counts = [column.numbers.get(bodies[0], {}) for column in columns]
-        rows += [(f"  {name}", [str(count.get(name, 0)) for count in counts]) for name in fields]
+        rows += [(f"  {', '.join(filter(None, (name, MEANINGS.get(name))))}",
+                  [str(count.get(name, 0)) for count in counts]) for name in fields]
         rows.append(("  together", [str(sum(count.values())) for count in counts]))
         rows.append(("  SVD for its stress", [c.svd.get(bodies[0], "-") for c in columns]))
     rows.append(("kernels that a stage calls", []))

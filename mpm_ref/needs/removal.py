@@ -14,7 +14,7 @@ from math import inf
 import numpy as np
 
 from ..scene import SceneError
-from ..sweep.observation import CRASHED, FINISHED, REFUSED, STOPPED, UNSTABLE
+from ..sweep.observation import CRASHED, FINISHED, REFUSED, STOPPED, TORN, UNSTABLE
 from ..sweep.runs import RunRequest
 from ..sweep.setting import scene_at, setting
 from .variant import changes
@@ -156,10 +156,12 @@ class RemovalStudy:
 
     def judged(self, label, variant, observation):
         """Return the `RemovalRun` of an observation, whatever its CPU time."""
-        outcome, cpu = observation.outcome, observation.cost.cpu
+        cpu, (outcome, message) = observation.cost.cpu, observation.ending
+        if outcome == TORN and self.base.tear:
+            outcome, message = FINISHED, ""
         if outcome != FINISHED:
             verdict = self.verdict_of_failure(observation)
-            return RemovalRun(label, verdict, {}, cpu, outcome, observation.message)
+            return RemovalRun(label, verdict, {}, cpu, outcome, message)
         change = {text: float(error[-1]) for text, error
                   in changes(self.base, observation, variant, self.first).items()}
         verdict = NOT_REQUIRED if max(change.values()) <= self.error else REQUIRED
@@ -174,8 +176,8 @@ class RemovalStudy:
         return replace(run, verdict=COSTLY) if is_costly else run
 
     def verdict_of_failure(self, observation):
-        """Return the verdict of a run that did not reach its end."""
-        if observation.outcome == UNSTABLE:
+        """Return the verdict of a run that did not reach its end, or tore a body."""
+        if observation.outcome == UNSTABLE or observation.tear:
             return REQUIRED
         if observation.outcome in (REFUSED, CRASHED):
             return IMPOSSIBLE

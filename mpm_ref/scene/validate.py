@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from ..shapes import Mesh
-from ..shapes.quantities import Vector
+from ..shapes.quantities import Coordinate, Vector
 from .builder import build_parts
 from .messages import SceneError, errors_at, joined, rephrase, shown
 from .quantity_records import check_quantity
@@ -108,4 +108,6 @@ def check_dimension(record, dim, path=""):
                 check_dimension(item, dim, f"{where}[{k}].")
         elif isinstance(value, tuple) and Vector in (field.type, *get_args(field.type)):
             if len(value) != dim:
-                raise SceneError(f"{where} = {list(value)}: expected {dim} numbers (dim = {dim})")
+                alone = dim == 2 and Coordinate in get_args(field.type)
+                expected = "a number" if alone else f"{dim} numbers"
+                raise SceneError(f"{where} = {list(value)}: expected {expected} (dim = {dim})")

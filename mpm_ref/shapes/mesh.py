@@ -140,8 +140,10 @@ def enclosed_volume(triangles):
 def read_triangles(file):
     """Return the triangles (M, 3, 3) of a closed mesh file (STL, OBJ, PLY, OFF), normals outward.
 
-    Needs trimesh. Raises ValueError where the file is missing, cannot be read, or holds a mesh that
-    is not closed.
+    Corners at one place are one, whatever their texture or normal. A mesh is closed if each edge
+    belongs to as many triangles of one orientation as of the other, also where more than two meet:
+    then the winding number is defined. Needs trimesh. Raises ValueError where the file is missing,
+    cannot be read, or holds a mesh that is not closed.
     """
     if not Path(file).is_file():
         raise ValueError(f"file = {str(file)!r}: no such file")
@@ -155,16 +157,16 @@ def read_triangles(file):
         raise ValueError(f"file = {str(file)!r}: not a readable mesh ({fault})") from None
     if not len(getattr(mesh, "faces", ())):
         raise ValueError(f"file = {str(file)!r}: holds no triangles")
-    if not (mesh.is_watertight and mesh.is_winding_consistent):
-        raise ValueError(f"file = {str(file)!r}: the mesh is not closed, {_open_edges(mesh)} of "
-                         "its edges do not join two triangles of one orientation; repair it first")
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    if unmatched := _open_edges(mesh):
+        raise ValueError(f"file = {str(file)!r}: the mesh is not closed, {unmatched} of its edges "
+                         "do not join triangles of one orientation; repair it first")
     triangles = np.array(mesh.triangles, dtype=float)
     return triangles if enclosed_volume(triangles) > 0.0 else triangles[:, ::-1].copy()
 
 
 def _open_edges(mesh):
-    """Return the number of directed edges without exactly one opposite edge."""
-    count = {}
-    for a, b in mesh.edges.tolist():
-        count[a, b] = count.get((a, b), 0) + 1
-    return sum(count.get((b, a), 0) != n or n != 1 for (a, b), n in count.items())
+    """Return the number of edges with more triangles of one orientation than of the other."""
+    directed = np.sign(mesh.edges[:, 1] - mesh.edges[:, 0])
+    _, edge = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_inverse=True)
+    return int(np.count_nonzero(np.bincount(edge.ravel(), weights=directed)))

@@ -23,6 +23,7 @@ from .probes import initial_order, interpolation
 from .quantity import OutputQuantity, Snapshot, check_quantities
 
 FINISHED, UNSTABLE, REFUSED, STOPPED = "finished", "unstable", "refused", "too long"
+TORN = "torn"           # finished, but a body tore by the grid: see `indicators`
 CRASHED = "crashed"     # its process was killed, it had no memory, or a file could not be read
 NEAR = 1.5              # steps before an observation from which on quantities are evaluated
 PERTURBATION = 1e-10    # cells by which positions are perturbed
@@ -71,6 +72,21 @@ class RunObservation:
     def finished(self):
         """Return whether the run reached its end."""
         return self.outcome == FINISHED
+
+    @property
+    def tear(self):
+        """Return the sentence on the first body that numerical fracture tore, "" without one."""
+        return next((text for text in self.warnings if text.startswith("gap: ")), "")
+
+    @property
+    def is_sound(self):
+        """Return whether the run reached its end with its elastic bodies whole."""
+        return self.finished and not self.tear
+
+    @property
+    def ending(self):
+        """Return the outcome and its message; TORN with its sentence where a body tore."""
+        return (TORN, self.tear) if self.finished and self.tear else (self.outcome, self.message)
 
 
 class _TooLong(Exception):

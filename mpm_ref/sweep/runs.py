@@ -39,7 +39,7 @@ class SceneRuns:
         """
         self._observed, self._executor, self._store = observed, executor, store
         self._deadline, self.on_run = time.monotonic() + budget, on_run
-        self.count = 0
+        self.count = self.reused = 0
 
     @property
     def left(self):
@@ -76,6 +76,7 @@ class SceneRuns:
                 runs.setdefault(keys[label], (label, run))
             else:
                 observations[label] = stored
+                self.reused += not isinstance(run, RunObservation)
         new = self._make(dict(runs.values()))
         observations |= {label: new[runs[key][0]] for label, key in keys.items()}
         return {label: observations[label] for label in requests}

@@ -28,6 +28,7 @@ from ..scene import SceneError
 from ..scene.validate import plain, validate_scene
 
 USUAL_PER_CELL = 2      # points per cell and axis, where the scene does not say
+DIGITS = 12             # of a scaled dx, without the round-off of the product
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def in_seconds(scene):
 
 def scale_dx(tables, factor):
     """Multiply the grid spacing; walls, which are counted in nodes, stay where they are."""
-    tables["dx"] *= factor
+    tables["dx"] = float(f"{tables['dx'] * factor:.{DIGITS}g}")
     if "relaxation" in tables["scheme"]:
         tables["scheme"]["relaxation"] *= factor
     if "dt" in tables:

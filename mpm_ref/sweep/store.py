@@ -45,6 +45,10 @@ class RunStore:
             return None
         return stored
 
+    def count(self):
+        """Return the number of runs in the folder."""
+        return 0 if self.folder is None else sum(1 for _ in self.folder.glob("*.npz"))
+
     def put(self, run, observation):
         """Store an observation. Raises `store.atomic.NotWritten`."""
         key = key_of(run)

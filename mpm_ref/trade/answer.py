@@ -6,11 +6,11 @@ import numpy as np
 
 from .. import __version__
 from ..store.text import counted
-from ..sweep.observation import FINISHED
+from ..sweep.observation import FINISHED, STOPPED
 from ..sweep.runs import LATE
 from ..sweep.scene_text import scene_text
 from ..sweep.setting import scene_at, setting
-from .cost import next_grid_facts, next_grid_text, price_text, rounded_up
+from .cost import duration, next_grid_facts, next_grid_text, price_text, rounded_up
 from .reference import LEAST
 from .search import REFERENCE_PART, without_grid
 from .start import start_fault
@@ -26,9 +26,10 @@ def answer_of(search, name, compared=None, budget=None):
     name: that of the scene; compared: {name: `RunObservation`} of results files; budget [s].
     """
     best, horizon = search.best(), search.horizon()
+    as_given = search.observations.get(AS_GIVEN)
     facts = {
-        "scene": name, "version": __version__, "error": search.error, "budget": budget,
-        "end": search.times[-1],
+        "scene": name, "dim": search.scene.dim, "version": __version__, "error": search.error,
+        "budget": budget, "end": search.times[-1],
         "quantities": list(search.quantities), "until": horizon, "chaos": search.chaos,
         "compared_with": search.compared_with,
         "grids": [search.scene.dx * factor for factor in search.levels],
@@ -37,6 +38,7 @@ def answer_of(search, name, compared=None, budget=None):
         "next_grid": next_grid_facts(search),
         "best": None if best is None else best.text,
         "start_fault": "" if best is None else start_fault(search, best),
+        "warnings": [] if as_given is None else list(as_given.warnings),
         "rows": [row(search, chosen) for chosen in ranked(search)],
         "compared": [compared_row(search, file, run) for file, run in (compared or {}).items()],
     }
@@ -55,6 +57,7 @@ def reference_facts(search, text):
     reference = search.references[text]
     return {"error": float(reference.error[search.last]),
             "error_at_end": float(reference.error[-1]), "order_at_end": float(reference.order[-1]),
+            "extrapolated": bool(reference.extrapolated[search.last or -1]),
             "differences": list(reference.differences), "scale": float(reference.scale[-1]),
             "least_error": search.least_error(text)}
 
@@ -89,7 +92,9 @@ def run_facts(search, run):
     """
     errors, at_end = ({text: search.error_of_run(run, (text,), k) for text in search.references}
                       for k in (None, -1))
-    return {"outcome": NOT_RUN if run.message == LATE else run.outcome, "message": run.message,
+    outcome, message = run.ending
+    return {"outcome": NOT_RUN if run.message == LATE else outcome, "message": message,
+            "until": run.until, "warnings": list(run.warnings),
             "error": search.error_of_run(run), "errors": errors,
             "error_at_end": search.error_of_run(run, k=-1), "errors_at_end": at_end,
             "dominated": is_dominated(search, run), **vars(run.cost)}
@@ -99,13 +104,13 @@ def is_dominated(search, run):
     """Return whether a setting has at most the error and less CPU time than a run: until the
     horizon, or until the end where no error is known.
     """
-    if not run.finished:
+    if not run.is_sound:
         return True
     k = search.last or -1
     error, cpu = search.error_of_run(run, k=k), run.cost.cpu
     others = [search.observations[chosen] for chosen in search.settings()]
     return any(search.error_of_run(one, k=k) <= error and one.cost.cpu < cpu
-               for one in others if one.finished)
+               for one in others if one.is_sound)
 
 
 def is_whole(facts):
@@ -131,8 +136,13 @@ def shown_rows(facts, key="rows"):
 
 def answer_lines(facts):
     """Return the answer as lines of text: the front, the advice, and what is not known."""
-    return [*front_lines(facts), "", *reference_lines(facts), *advice_lines(facts),
-            *map(compared_line, facts["compared"])]
+    return [*warning_lines(facts), *front_lines(facts), "", *reference_lines(facts),
+            *advice_lines(facts), *map(compared_line, facts["compared"])]
+
+
+def warning_lines(facts):
+    """Return the warnings of the run of the scene as given."""
+    return [f"warning: the scene as given: {text}" for text in facts["warnings"]]
 
 
 def front_lines(facts):
@@ -140,43 +150,54 @@ def front_lines(facts):
     there are; where no error is known, with the grids of the reference.
     """
     known, rows = has_errors(facts), shown_rows(facts)
+    several = len(facts["quantities"]) > 1
     front = [one for one in rows if not one["dominated"] and is_number(one["error"])]
     shown = [one for one in rows if one in front or one["as_given"]
              or (not known and list(one["setting"]) == ["dx"])]
     lines = [] if is_whole(facts) else [f"errors until t = {facts['until']:.4g} s:" if known else
                                         "no error is known; differences from the reference "
                                         "over the whole run:"]
+    if several:
+        lines.append(f"largest of {len(facts['quantities'])} quantities, with the one that has it:")
     lines.append(f"{'setting':44} {'error' if known else 'differs':>9} {'CPU [s]':>9} "
                  f"{'particles':>9} {'steps':>7}")
     outcomes = [one["outcome"] for one in rows]
     counts = ", ".join(f"{outcomes.count(word)} {word}" for word in dict.fromkeys(outcomes))
     number = f"{len(front)} settings on the front; " if known else ""
-    return [*lines, *map(row_line, shown), f"({number}of {len(outcomes)} settings {counts})"]
+    texts = facts["quantities"] if several else ()
+    errors = "errors" if known else "errors_at_end"
+    return [*lines, *(row_line(one, texts, errors) for one in shown),
+            f"({number}of {len(outcomes)} settings {counts})"]
 
 
-def row_line(one):
-    """Return the line of a row in the table."""
+def row_line(one, texts, errors):
+    """Return the line of a row in the table, with the one of several quantities (or of none) that
+    has the largest of its errors, which stand under a key.
+    """
     marks = [word for key, word in (("best", "recommended"), ("as_given", "as given")) if one[key]]
     mark = f"  <- {', '.join(marks)}" if marks else ""
     error = percent(one["error"]) if one["outcome"] == FINISHED else one["outcome"]
+    worst = f"  {max(texts, key=lambda text: one[errors].get(text) or 0.0)}" if texts else ""
     return (f"{one['text']:44} {error:>9} {one['cpu'] or 0.0:9.3g} {one['particles']:9d} "
-            f"{one['steps']:7d}{mark}")
+            f"{one['steps']:7d}{worst}{mark}")
 
 
 def reference_lines(facts):
     """Return how far the solution is known."""
     if len(facts["grids"]) < 2:
-        return ["fewer than two grids finished: nothing is known of the solution"]
+        return ["fewer than two grids finished with whole bodies: nothing is known of the solution"]
     grids = ", ".join(f"{dx:.3g}" for dx in facts["grids"])
-    lines = [f"reference: grids of dx = {grids} m, extrapolated"]
+    lines = [f"reference: grids of dx = {grids} m"]
     for text in facts["quantities"]:
         reference = facts["references"][text]
         between = ", ".join(percent(value) for value in reference["differences"])
         error = f"{percent(reference['error'])} until t = {facts['until']:.4g} s"
         if not has_errors(facts):
             error = f"{percent(reference['error_at_end'])} over the whole run"
-        lines.append(f"  {text}: known to {error}; differences of grids over the whole run: "
-                     f"{between}")
+        how = ("extrapolated" if reference["extrapolated"] else
+               "that on the finest grid, not extrapolated, since no two orders agree")
+        lines.append(f"  {text}: known to {error} ({how}); differences of grids over the whole "
+                     f"run: {between}")
     if is_number(facts["chaos"]):
         lines.append(f"  from t = {facts['chaos']:.4g} s on a run perturbed by round-off diverges: "
                      "single paths have no meaning there; ask for profile:x or energies")
@@ -251,10 +272,7 @@ def companion_lines(facts):
 def shortfalls(facts):
     """Return what it would take to know the quantities for the whole run, in some texts."""
     if len(facts["grids"]) < 2:
-        own = next((one for one in facts["rows"] if one["setting"] == {"dx": 1.0}), None)
-        why = ("" if own is None or own["outcome"] == FINISHED else
-               f" (the scene as given: {own['outcome']}: {own['message']})")
-        return [f"at least two grids must finish{why}; give a larger --budget"]
+        return [missing_grids(facts)]
     asked, texts = REFERENCE_PART * facts["error"], []
     for text in facts["quantities"]:
         reference = facts["references"][text]
@@ -272,6 +290,25 @@ def shortfalls(facts):
     if not texts:
         texts.append(f"the finest grid, dx = {facts['grids'][-1]:.3g} m, does not keep the error")
     return [*texts, next_grid_text(facts)]
+
+
+def missing_grids(facts):
+    """Return why fewer than two grids make a reference, and what to do."""
+    grids = [one for one in facts["rows"] if list(one["setting"]) == ["dx"]]
+    failed = [one for one in grids if one["outcome"] not in (FINISHED, NOT_RUN, STOPPED)]
+    stopped = next((one for one in grids if one["outcome"] == STOPPED and one["until"] > 0.0), None)
+    if not failed and stopped is None:
+        return "at least two grids must finish; give a larger --budget"
+    if not failed:
+        share = stopped["until"] / facts["end"]
+        return (f"at least two grids must finish; {stopped['text']} reached t = "
+                f"{stopped['until']:.3g} of {facts['end']:.3g} s in {duration(stopped['cpu'])} of "
+                f"CPU time, so that it takes about {duration(stopped['cpu'] / share)}, and the "
+                f"next grid {2 ** (facts['dim'] + 1)} times that; give a larger --budget")
+    worst = next((one for one in failed if one["as_given"]), failed[0])
+    name = "the scene as given" if worst["as_given"] else worst["text"]
+    return (f"at least two grids must finish with whole bodies, which a larger --budget does not "
+            f"change; {name}: {worst['outcome']}: {worst['message']}")
 
 
 def is_number(value):

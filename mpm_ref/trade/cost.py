@@ -32,7 +32,7 @@ def obstacle(search, chosen):
     """Return why a larger budget does not run the next grid, in words; "" where it does."""
     run = search.observations.get(chosen)
     if run is not None and run.outcome != STOPPED:
-        return f"{run.outcome}: {run.message}" if run.message else run.outcome
+        return ": ".join(filter(None, run.ending))
     if chosen.get("dx") < search.finest:
         return "this command runs none so fine"
     if search.idle > PATIENCE:

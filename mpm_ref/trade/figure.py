@@ -7,7 +7,7 @@ from math import inf
 
 from ..store.atomic import replacing
 from ..store.text import figure_text
-from ..sweep.observation import FINISHED
+from ..sweep.observation import FINISHED, TORN
 from .answer import has_errors, percent, shown_rows
 
 COSTS = {"cpu": "CPU time [s]", "wall": "wall time [s]", "memory": "memory [bytes]"}
@@ -79,8 +79,9 @@ def drawn_rows(facts, key):
 
 
 def rows_with_error(rows, key):
-    """Return the rows with an error and a cost."""
-    return [row for row in rows if row["error"] is not None and (row[key] or 0.0) > 0.0]
+    """Return the rows with an error and a cost, whose bodies stayed whole."""
+    return [row for row in rows if row["error"] is not None and row["outcome"] != TORN
+            and (row[key] or 0.0) > 0.0]
 
 
 def limits(values):
@@ -114,8 +115,8 @@ def is_on_front(row, rows, key):
 
 
 def draw_failures(axes, rows):
-    """Mark settings that did not finish at the top, at the CPU time that they took."""
+    """Mark settings that did not finish, or tore, at the top, at the CPU time that they took."""
     failed = [row["cpu"] for row in rows if row["outcome"] != FINISHED and (row["cpu"] or 0.0) > 0]
     top = [1.0] * len(failed)
     axes.plot(failed, top, "x", color=FAILED, transform=axes.get_xaxis_transform(), clip_on=False,
-              label="did not finish")
+              label="failed")

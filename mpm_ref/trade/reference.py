@@ -32,6 +32,7 @@ class QuantityReference:
     scale: np.ndarray       # (T,) largest change so far
     error: np.ndarray       # (T,) estimate, relative; infinite where nothing is known
     order: np.ndarray       # (T,) observed
+    extrapolated: np.ndarray    # (T,) whether the values are; else they are the finest grid's
     differences: tuple      # between successive grids over the whole run, relative
 
     def raised(self, error):
@@ -66,7 +67,7 @@ def reference_of(levels):
     error = np.where(pairs[-1] <= NOTHING * scale, NOTHING, error)
     error[0] = np.inf       # where nothing has changed yet
     last = tuple(float(relative(pair, scale)[-1]) for pair in pairs)
-    return QuantityReference(values, scale, error, order, last)
+    return QuantityReference(values, scale, error, order, safe, last)
 
 
 def observed_order(pairs, scale):

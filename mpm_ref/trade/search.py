@@ -121,11 +121,13 @@ class TradeSearch:
                 if t <= (self.runs.workers - 1) * cpu]
 
     def update_references(self):
-        """Compute the references from the finest unbroken sequence of halved grids."""
+        """Compute the references from the first unbroken sequence of halved grids, the coarsest
+        first, on which the run is sound.
+        """
         factors, factor = [], COARSEST
         while factor >= FINEST:
             run = self.observations.get(setting(dx=factor))
-            if run is not None and run.finished:
+            if run is not None and run.is_sound:
                 factors.append(factor)
             elif factors and run is not None:
                 break
@@ -168,7 +170,7 @@ class TradeSearch:
         chosen = setting(dx=self.levels[-2], transfer=other)
         self.observe([chosen], most_cpu=np.inf)
         run = self.observations[chosen]
-        if run.finished:
+        if run.is_sound:
             self.compared_with = other
             for text, reference in self.references.items():
                 shrunk = reference.error_of(run.values[text]) / 2.0**np.clip(reference.order, 0, 2)
@@ -231,8 +233,12 @@ class TradeSearch:
         return float(max(own / REFERENCE_PART, own + finest, self.divergence(text)[-1] / DIVERGED))
 
     def keeps(self, chosen):
-        """Return whether a setting keeps the error asked, that of the reference included."""
-        return self.error_of(chosen) + self.reference_error() <= self.error
+        """Return whether a setting keeps the error asked, that of the reference included, with
+        its bodies whole.
+        """
+        run = self.observations.get(chosen)
+        return (run is not None and run.is_sound
+                and self.error_of_run(run) + self.reference_error() <= self.error)
 
     def best(self):
         """Return the cheapest setting that keeps the error, or None."""

@@ -1,4 +1,5 @@
 import json
+import re
 import shutil
 
 import numpy as np
@@ -44,6 +45,15 @@ def test_a_second_call_makes_no_run_again(folder):
     assert json.loads(done.stdout)["best"] is not None
     again = {file: file.stat().st_mtime_ns for file in (folder / "flight.trade").iterdir()}
     assert {file: again[file] for file in stored} == stored
+
+
+def test_runs_of_other_quantities_are_said_to_be_of_no_use(folder, tmp_path):
+    shutil.copytree(folder / "flight.trade", tmp_path / "flight.trade")
+    options = (folder / "flight.toml", "--error", "10%", "--out", tmp_path, "--budget", "1s",
+               "--workers", "1", "--quiet")
+    assert "could be used" not in mpm_ref("trade", *options).stderr
+    done = mpm_ref("trade", *options, "--quantity", "centroid")
+    assert re.search(r"warning: none of the \d+ runs in .* could be used", done.stderr)
 
 
 def test_a_bad_start_is_told_and_written(folder, tmp_path, monkeypatch):

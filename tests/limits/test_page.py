@@ -24,7 +24,14 @@ from mpm_ref.limits.verdict import (
 )
 from mpm_ref.scene import loads
 from mpm_ref.store.page import page_of
-from mpm_ref.sweep.observation import FINISHED, REFUSED, STOPPED, UNSTABLE, RunCost
+from mpm_ref.sweep.observation import (
+    FINISHED,
+    REFUSED,
+    STOPPED,
+    UNSTABLE,
+    RunCost,
+    RunObservation,
+)
 
 SCENE = """
 dim = 2
@@ -49,7 +56,7 @@ class SyntheticJudge:
     def __init__(self, most=10**9):
         self.scenes, self.quantities = CellScenes(loads(SCENE), PROBES), ("positions",)
         self.error, self.cpu, self.tolerance = 0.01, 80.0, {"positions": 0.02}
-        self.base = {1.0: SimpleNamespace(outcome=FINISHED, cost=RunCost(1.0, 1.0, 10, 4, 1))}
+        self.base = {1.0: RunObservation({}, RunCost(1.0, 1.0, 10, 4, 1), FINISHED)}
         self.runs = SimpleNamespace(workers=1)
         self.verdicts, self.most, self.coarse = {(): self.verdict({})}, most, {}
 
@@ -129,8 +136,8 @@ def test_poissons_ratio_is_told_by_its_values():
     """Its factors are those of 1 - 2 nu, which grows where nu falls."""
     sentences = {one["direction"]: one["sentence"] for one in facts_of()["directions"]
                  if one["axis"] == "poisson"}
-    assert sentences["down"] == ("Poisson's ratio may grow to nu = 0.4998 (from nu = 0.3), as far "
-                                 "as was tried")
+    assert sentences["down"] == ("Poisson's ratio may grow to nu = 0.4998 (from nu = 0.3) "
+                                 "(compared with itself at 2 dx alone), as far as was tried")
     assert sentences["up"].startswith("Poisson's ratio may fall ")
     verbs = {(one["axis"], one["direction"]): one["verb"] for one in facts_of()["directions"]}
     assert (verbs["poisson", "up"], verbs["poisson", "down"]) == ("fall", "grow")

@@ -23,6 +23,7 @@ from mpm_ref.sweep.observation import (
     FINISHED,
     REFUSED,
     STOPPED,
+    TORN,
     UNSTABLE,
     RunCost,
     RunObservation,
@@ -208,10 +209,33 @@ def test_mixed_cell_meets_the_limit_of_a_setting_where_its_physical_problem_is_r
 
 
 def test_warnings_and_indicators_of_the_run_belong_to_the_verdict():
-    own = replace(observation(3.0), warnings=("gap: wide",), indicators={"gap": 3.0})
+    own = replace(observation(3.0), warnings=("dispersion: wide",), indicators={"dispersion": 3.0})
     verdict, _ = verdict_on({"density": 2.0}, **labels("density x 2", own, 3.5))
     assert verdict.outcome == RIGHT
-    assert (verdict.warnings, verdict.indicators) == (("gap: wide",), {"gap": 3.0})
+    assert verdict.warnings == ("dispersion: wide",)
+    assert verdict.indicators == {"dispersion": 3.0}
+
+
+TORN_RUN = replace(observation(3.0), warnings=("gap: wide",))
+
+
+@pytest.mark.parametrize(("own", "coarse", "fine", "message"), [
+    (TORN_RUN, 3.0, 3.0, "gap: wide"), (3.0, 9.0, TORN_RUN, "at dx/2: gap: wide"),
+    (3.0, TORN_RUN, TORN_RUN, "at dx/2: gap: wide")])
+def test_a_cell_whose_run_or_reference_tears_is_torn(own, coarse, fine, message):
+    verdict, _ = verdict_on({"density": 2.0}, **labels("density x 2", own, coarse, fine))
+    assert (verdict.outcome, verdict.message, verdict.is_right) == (TORN, message, False)
+
+
+def test_a_torn_coarse_run_does_not_make_a_cell_right():
+    verdict, _ = verdict_on({"density": 2.0}, **labels("density x 2", 3.0, TORN_RUN, 3.1))
+    assert (verdict.outcome, verdict.reference) == (RIGHT, AT_FINE)
+
+
+def test_nothing_is_torn_where_the_scene_as_given_tears():
+    base = {label: replace(observation(x), warnings=("gap: wide",)) for label, x in BASE.items()}
+    verdict, _ = verdict_on({"density": 2.0}, **base, **labels("density x 2", TORN_RUN, 3.0))
+    assert verdict.outcome == RIGHT
 
 
 @pytest.mark.parametrize(("factors", "outcome"), [({"size": 2.0}, LOST), ({"density": 2.0}, LOST),

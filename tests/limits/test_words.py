@@ -30,7 +30,8 @@ def direction(good=1.0, bad=None, end=MARGIN, axis="stiffness", **more):
     facts = {"axis": axis, "text": "the stiffness", "good": good, "bad": bad, "end": end,
              "margin": max(good, 1.0 / good), "direction": "up" if factors[0] > 1.0 else "down",
              "verb": "grow" if factors[0] > 1.0 else "fall", "now": "E = 1",
-             "late": None, "late_cell": None, "first_bad": bad and cell(REFUSED)}
+             "compared_with": AT_FINE, "late": None, "late_cell": None,
+             "first_bad": bad and cell(REFUSED)}
     values = {f"{key}_value": None if facts[key] is None else f"E = {facts[key]:g}"
               for key in ("good", "bad")}
     facts |= values | more
@@ -40,6 +41,8 @@ def direction(good=1.0, bad=None, end=MARGIN, axis="stiffness", **more):
 @pytest.mark.parametrize(("facts", "words"), [
     (direction(10.0, 11.0), "the stiffness may grow 10 times (E = 10); at 11 times (E = 11): "
      "refused: it was so"),
+    (direction(10.0, 11.0, compared_with=AT_COARSE), "the stiffness may grow 10 times (E = 10) "
+     "(compared with itself at 2 dx alone); at 11 times (E = 11): refused: it was so"),
     (direction(0.1, 0.05), "the stiffness may be divided by 10 (E = 0.1); divided by 20 "
      "(E = 0.05): refused: it was so"),
     (direction(bad=0.1, end=BUDGET_END), "the stiffness divided by 10 (E = 0.1): refused: it was "
@@ -78,8 +81,8 @@ def test_a_milder_failure_is_nearest_only_where_there_is_no_other():
 
 def test_a_vanishing_quantity_is_told_by_its_change_in_the_scene_as_given():
     text = wrong_text(cell(WRONG, VANISHING, error=50.0, share=1e-4, quantity="impulse:plate"))
-    assert text == ("by vanishing quantity: impulse:plate nearly vanishes here (at dx/2 it has "
-                    "0.01 % of its change in the scene as given), so that its relative error means "
+    assert text == ("(vanishing quantity): impulse:plate nearly vanishes here (at dx/2 it has 0.01 "
+                    "% of its change in the scene as given), so that its relative error means "
                     "little: it is 0.5 % of that change off")
 
 
@@ -100,6 +103,7 @@ def test_a_wider_tolerance_than_asked_has_its_reason():
 
 
 FACTS = {
+    "warnings": [],
     "wrong": [], "limits": {}, "cells": [], "nearest": None, "left_out": {}, "complete": True,
     "title": "", "scene": "toy", "tolerance": {"positions": 0.2}, "error": 0.01, "slack": 2.0,
     "directions": [direction(10.0, end=LAST_RUNG), direction(0.1, end=BUDGET_END)]}
@@ -125,6 +129,20 @@ def pair_map(*outcomes):
 ])
 def test_only_pairs_that_were_judged_are_counted(outcomes, words):
     assert map_lines({"maps": [pair_map(*outcomes)]}) == [f"stiffness and density: {words}"]
+
+
+def test_warnings_of_the_scene_and_of_right_cells_stand_first():
+    warned = cell(RIGHT, warnings=("dispersion: waves",), factors={"density": 2.0}, text="density")
+    facts = FACTS | {"maps": [], "warnings": ["gap: wide"], "cells": [warned, warned]}
+    assert answer_lines(facts)[:2] == [
+        "warning: the scene as given: gap: wide",
+        "right with a warning of the run: 2 cells, such as density: dispersion: waves"]
+
+
+def test_the_nearest_failure_is_that_of_the_nearest_bad_factor():
+    far = direction(good=1.0, bad=10.0, first_bad=cell(WRONG, RESOLUTION))
+    near = direction(good=1.9, bad=2.0, first_bad=cell(WRONG, RESOLUTION))
+    assert nearest([far, near]) is near
 
 
 def test_the_tolerance_stands_before_the_margins():

@@ -36,7 +36,9 @@ def drop(tmp_path_factory):
 
 def test_lines_of_the_answer(drop):
     lines = drop[1].splitlines()
-    assert lines[0].startswith("Drop: 16 particles, 50 steps, ")
+    assert lines[0].startswith("warning: the scene as given: 1 of the 16 particles of body 'drop'")
+    assert lines[1].startswith("warning: the scene as given: dissipation: ")
+    assert lines[2].startswith("Drop: 16 particles, 50 steps, ")
     assert any(line.startswith("gravity: required (changes positions by 100 %") for line in lines)
     assert any(line.startswith("collider roof: not required at 1 % (positions by 0 %)")
                for line in lines)

@@ -251,3 +251,12 @@ def test_absurd_shapes_are_sampled_or_refused(few_points, d, data, dx):
 def test_rich_scene_itself_is_right():
     scene = validate_scene(RICH)
     assert len(build_conditions(scene).parts) == 2
+
+
+def test_an_angular_velocity_in_2d_is_a_number():
+    tables = {"dim": 2, "dx": 0.1, "end": 1.0, "body": [{
+        "name": "disk", "density": 1.0, "velocity": {"angular": [0.0, 0.0, 8.0]},
+        "shape": {"type": "sphere", "center": [0.5, 0.5], "radius": 0.2},
+        "material": {"law": "fixed_corotated", "E": 1.0, "nu": 0.3}}]}
+    with pytest.raises(SceneError, match=r"angular = \[0.0, 0.0, 8.0\]: expected a number"):
+        validate_scene(tables)

@@ -261,6 +261,37 @@ def test_open_mesh_is_refused(stl):
         solid(shapes.Mesh(file=stl(body)))
 
 
+def test_two_bodies_that_share_an_edge_are_closed(stl):
+    # four triangles meet there, two of either orientation
+    other = trimesh.creation.box((1.0, 1.0, 1.0))
+    other.apply_translation((1.0, 1.0, 0.0))
+    both = trimesh.util.concatenate([trimesh.creation.box((1.0, 1.0, 1.0)), other])
+    both.merge_vertices()
+    assert not both.is_watertight
+    part = solid(shapes.Mesh(file=stl(both)))
+    assert part.volume == pytest.approx(2.0)
+    assert part.inside(np.array([[0.1, 0.2, 0.3], [1.1, 0.8, 0.3], [1.0, 0.0, 0.0]])).tolist() \
+        == [True, True, False]
+
+
+def test_a_triangle_that_is_there_twice_leaves_the_mesh_open(stl):
+    body = trimesh.creation.box((1.0, 1.0, 1.0))
+    twice = trimesh.Trimesh(body.vertices, [*body.faces, body.faces[0]], process=False)
+    with pytest.raises(ValueError, match="not closed, 3 of its edges"):
+        solid(shapes.Mesh(file=stl(twice)))
+
+
+def test_corners_that_differ_in_their_texture_are_one(tmp_path):
+    body = trimesh.creation.box((1.0, 1.0, 1.0))
+    lines = [f"v {x} {y} {z}" for x, y, z in body.vertices]
+    lines += [f"vt {k / 36} 0" for k in range(36)]
+    lines += [f"f {a + 1}/{3 * k + 1} {b + 1}/{3 * k + 2} {c + 1}/{3 * k + 3}"
+              for k, (a, b, c) in enumerate(body.faces)]
+    (tmp_path / "textured.obj").write_text("\n".join(lines))
+    assert len(trimesh.load_mesh(tmp_path / "textured.obj").vertices) == 36
+    assert solid(shapes.Mesh(file=str(tmp_path / "textured.obj"))).volume == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize(("name", "text", "said"), [
     ("none.stl", None, "no such file"),
     ("junk.stl", "junk", "not a readable mesh|no triangles"),

@@ -21,12 +21,13 @@ class ModelRuns:
         self.order, self.left, self.labels = order, left, []
         self.probes = (("disk", np.array([[0.25, 0.45], [0.75, 0.95]])),)
         self.fails, self.chaos = lambda text: False, 0.0
+        self.tears, self.answers = lambda chosen: False, lambda run: run
 
     def has(self, request):
         return False
 
     def observe(self, requests):
-        return {label: self.run(label) for label in requests}
+        return {label: self.answers(self.run(label)) for label in requests}
 
     def run(self, label):
         self.labels.append(label)
@@ -44,7 +45,8 @@ class ModelRuns:
         if self.fails(text):
             return RunObservation({"positions": values[:, :0]}, RunCost(), REFUSED, "refused")
         both = {"positions": values, "kinetic": later}
-        return RunObservation(both, RunCost(cpu, cpu, 10, 100, 1), FINISHED)
+        warnings = ("gap: torn",) if self.tears(chosen) else ()
+        return RunObservation(both, RunCost(cpu, cpu, 10, 100, 1), FINISHED, warnings=warnings)
 
 
 def search_of(runs, error=0.01):

@@ -1,5 +1,6 @@
 import json
 import re
+from dataclasses import replace
 
 import pytest
 from model_runs import ModelRuns, search_of
@@ -9,7 +10,7 @@ from mpm_ref.cli.terminal import as_json
 from mpm_ref.scene import loads
 from mpm_ref.store.page import page_of
 from mpm_ref.sweep.difference import difference_so_far
-from mpm_ref.sweep.observation import STOPPED, RunCost, RunObservation
+from mpm_ref.sweep.observation import STOPPED, TORN, RunCost, RunObservation
 from mpm_ref.sweep.runs import LATE
 from mpm_ref.sweep.setting import setting
 from mpm_ref.trade.answer import (
@@ -18,6 +19,7 @@ from mpm_ref.trade.answer import (
     answer_lines,
     answer_of,
     best_scene,
+    front_lines,
     is_whole,
     percent,
     shortfalls,
@@ -172,7 +174,60 @@ def test_words_say_why_no_grid_finished():
     runs.fails = lambda text: True
     _, facts = facts_of(runs)
     text = "\n".join(answer_lines(facts))
-    assert "at least two grids must finish (the scene as given: refused: refused)" in text
+    assert ("at least two grids must finish with whole bodies, which a larger --budget does not "
+            "change; the scene as given: refused: refused") in text
+
+
+def test_words_say_what_a_grid_that_was_stopped_would_take():
+    runs = ModelRuns()
+    runs.answers = lambda run: replace(run, outcome=STOPPED, until=0.25, message="stopped",
+                                       cost=RunCost(30.0, 30.0, 10, 100, 1))
+    _, facts = facts_of(runs)
+    assert ("at least two grids must finish; dx x 4 reached t = 0.25 of 1 s in 30 s of CPU time, "
+            "so that it takes about 2 min, and the next grid 8 times that") in shortfalls(facts)[0]
+
+
+def torn_from(dx):
+    """Runs whose bodies tear on grids of at most dx times a factor."""
+    runs = ModelRuns()
+    runs.tears = lambda chosen: chosen.get("dx", 1.0) <= dx
+    return runs
+
+
+def test_torn_grids_are_no_reference_and_torn_settings_are_not_recommended():
+    search, facts = facts_of(torn_from(0.25), error=0.05)
+    assert search.levels == (4.0, 2.0, 1.0, 0.5)
+    torn = [row for row in facts["rows"] if row["outcome"] == TORN]
+    assert max(row["setting"]["dx"] for row in torn) == 0.25
+    assert torn[0]["message"] == "gap: torn"
+    assert not any(row["keeps"] or row["best"] for row in torn)
+    assert facts["next_grid"]["obstacle"] == "torn: gap: torn"
+
+
+def test_words_say_that_bodies_tear_on_all_grids():
+    _, facts = facts_of(torn_from(4.0))
+    lines = answer_lines(facts)
+    assert lines[0] == "warning: the scene as given: gap: torn"
+    assert "does not change; the scene as given: torn: gap: torn" in shortfalls(facts)[0]
+
+
+@pytest.mark.parametrize(("order", "words"), [(1.0, "(extrapolated)"), (0.2, "not extrapolated")])
+def test_words_say_whether_the_reference_is_extrapolated(order, words):
+    _, facts = facts_of(ModelRuns(order=order))
+    assert words in "\n".join(answer_lines(facts))
+
+
+def test_of_several_quantities_each_row_names_the_one_with_its_error():
+    search = search_of(ModelRuns())
+    search.quantities = ("positions", "kinetic")
+    search.run()
+    facts = json.loads(as_json(answer_of(search, "toy")))
+    for row in facts["rows"]:
+        row["errors"] = {"positions": 1e-3, "kinetic": 2e-3}
+    lines = front_lines(facts)
+    assert lines[0] == "largest of 2 quantities, with the one that has it:"
+    assert len(lines) > 3
+    assert all("kinetic" in line and "positions" not in line for line in lines[2:-1])
 
 
 def test_words_say_until_when_the_advice_holds_and_what_is_known_longer():

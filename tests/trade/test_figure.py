@@ -54,7 +54,7 @@ def test_results_files_are_diamonds(facts):
 
 
 def test_failures_are_crosses(facts):
-    assert points(draw_trade(facts).axes[0], "did not finish").tolist() == [[0.25, 1.0]]
+    assert points(draw_trade(facts).axes[0], "failed").tolist() == [[0.25, 1.0]]
 
 
 def test_a_figure_that_cannot_be_written_is_an_error(facts, tmp_path):

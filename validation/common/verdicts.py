@@ -17,7 +17,7 @@ VARIANTS = {        # words behind the id of a printed number
                 "which has faults",
     "admissible": "laws that thermodynamics admits in place of the paper's",
     "narrow": "a graph network of another size than the paper's",
-    "stand-in": "a body in place of one whose mesh is not public",
+    "stand-in": "a body in place of one whose mesh is not part of the repository",
     "displacement": "relative to the displacement instead of the distance from the origin",
     "partial": "over fewer runs than the printed number",
     "small": "at another size than the printed number",

@@ -161,10 +161,16 @@ def picture(bodies):
                  .astype(np.float32) for part in zip(*rows, strict=True))
 
 
+def unpublished(folder):
+    """Return a folder that is there, and that version control leaves out."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / ".gitignore").write_text("*\n", encoding="utf-8")
+    return folder
+
+
 def write(file, history):
     """Write a history, in a folder that version control leaves out."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    (file.parent / ".gitignore").write_text("*\n", encoding="utf-8")
+    unpublished(file.parent)
     part = file.with_suffix(".part.npz")
     arrays = {k: v for k, v in history._asdict().items() if k != "facts"}
     np.savez_compressed(part, facts=np.array(json.dumps(history.facts)), **arrays)

@@ -3,6 +3,8 @@
 The particles at some times are stored as ``results/<profile>/states/<scene>.npz``, which is not
 published. A scene that is there, run by the same version of the package, is not run again: records
 say at which commit it was. What the state figures draw is kept among ``results/<profile>/bodies``.
+At the printed size bodies are those of the release, where the user names their meshes
+(`real_bodies`).
 """
 
 from math import inf
@@ -14,7 +16,8 @@ from ..common.even_points import even_subset
 from ..common.registry import experiment
 from ..common.scenes import evenly
 from ..ldm.published_bodies import keep
-from .run_history import COLUMNS, run_history
+from .real_bodies import BODIES, absent, bodies_text, real_scene
+from .run_history import COLUMNS, run_history, unpublished
 from .sizes import SIZES, sized
 
 METHOD = "hot"
@@ -39,8 +42,17 @@ def scene_experiment(scene, seconds, quick=None):
         end = run.choose(quick={"end": quick}, standard={}, paper={})
         size, patience = run.choose(quick=("quick", PATIENCE), standard=("quick", PATIENCE),
                                     paper=("paper", inf))
-        record_run(run, scene, sized(f"hot_{scene}", size, unstable="allow", **end), patience)
+        record = sized(f"hot_{scene}", size, unstable="allow", **end)
+        if run.profile == "paper" and scene in BODIES:
+            record = printed_bodies(run, scene, record)
+        record_run(run, scene, record, patience)
     return whole_run
+
+
+def printed_bodies(run, name, scene):
+    """Return a scene with the release's bodies, where their meshes are there, and note which."""
+    run.note(bodies_text(name))
+    return scene if absent(name) else real_scene(name, scene, unpublished(run.folder / "states"))
 
 
 def record_run(run, name, scene, patience):

@@ -1,15 +1,13 @@
 """Bodies that stand for NCLaw's meshes, which are not here: capsules, balls and rings.
 
 Each is about the origin, y upwards, with 1 the largest edge of its box, and has roughly the volume
-of its mesh as sampled by the authors' release. A mesh of the user's is used instead where
-`MESHES` holds NAME.obj.
+of its mesh as sampled by the authors' release. A mesh of the user's, NAME.obj, is used instead (see
+`user_meshes`).
 """
-
-from pathlib import Path
 
 from mpm_ref.scene import Capsule, Mesh, Sphere, Torus, Transformed, Union
 
-MESHES = Path(__file__).parent / "meshes"
+from ..common.user_meshes import mesh_file
 
 
 def limb(start, end, radius):
@@ -92,13 +90,13 @@ def toy(name, size, center=(0.5, 0.5, 0.5)):
     stand-in.
     """
     if has_mesh(name):
-        return Mesh(file=str(MESHES / f"{name}.obj"), size=size, center=center)
+        return Mesh(file=str(mesh_file("nclaw", f"{name}.obj")), size=size, center=center)
     return Transformed(shape=STAND_INS[name], scale=size, about=(0.0, 0.0, 0.0), translate=center)
 
 
 def has_mesh(name):
     """Return whether a mesh of the user's is used."""
-    return (MESHES / f"{name}.obj").is_file()
+    return mesh_file("nclaw", f"{name}.obj") is not None
 
 
 def body_label(name):

@@ -95,7 +95,7 @@ def true_search(one, runs, times, probes):
         zero = np.zeros(len(times))
         for text, values in one.exact(times, np.concatenate([X for _, X in probes])).items():
             truth.references[text] = QuantityReference(
-                values, change_so_far(values), zero, zero, ())
+                values, change_so_far(values), zero, zero, zero > 0.0, ())
     return truth
 
 
@@ -117,7 +117,7 @@ def least_of(search, truth):
     """Return the cheapest of all settings tried that keeps the error, or None."""
     if search.horizon() <= 0.0:
         return None
-    good = [s for s in truth.settings() if truth.observations[s].finished
+    good = [s for s in truth.settings() if truth.observations[s].is_sound
             and s.get("dx", 1.0) >= SEARCHED and true_error(s, search, truth) <= search.error]
     return min(good, key=lambda s: truth.observations[s].cost.cpu, default=None)
 

@@ -6,6 +6,7 @@ import pytest
 from mpm_ref.problem import Clock
 from mpm_ref.scene import Mesh, Poisson, build
 from mpm_ref.shapes.inside import solid
+from validation.common import user_meshes
 from validation.common.scenes import with_
 from validation.nclaw import gallery, stand_in_bodies, tasks
 from validation.nclaw.environments import ENVIRONMENTS
@@ -70,11 +71,13 @@ def test_stand_ins_are_as_long_and_as_large_as_the_meshes(toy):
 
 
 def test_a_mesh_of_the_users_is_taken_instead(tmp_path, monkeypatch):
-    monkeypatch.setattr(stand_in_bodies, "MESHES", tmp_path)
+    monkeypatch.setenv(user_meshes.VARIABLE, str(tmp_path))
     assert stand_in_bodies.body_label("bunny") == "a stand-in for bunny"
-    (tmp_path / "bunny.obj").write_text("v 0 0 0")
-    assert stand_in_bodies.toy("bunny", 0.7) == Mesh(file=str(tmp_path / "bunny.obj"), size=0.7,
-                                          center=(0.5, 0.5, 0.5))
+    file = tmp_path / "nclaw" / "bunny.obj"
+    file.parent.mkdir()
+    file.write_text("v 0 0 0")
+    assert stand_in_bodies.toy("bunny", 0.7) == Mesh(file=str(file), size=0.7,
+                                                     center=(0.5, 0.5, 0.5))
     assert stand_in_bodies.body_label("bunny") == "bunny"
     assert not isinstance(stand_in_bodies.toy("spot", 0.7), Mesh)
 
