@@ -10,18 +10,21 @@ runs of many steps, and is what one usually wants.
 
 import numpy as np
 
+from .core.adjoint import corotated, strain
 from .core.adjoint import deform as deform_adjoint
 from .core.adjoint.boundary import solve_adjoint
 from .core.adjoint.deform import DeformBars, DeformStep
 from .core.adjoint.grid import Update, update_adjoint
-from .core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint
+from .core.adjoint.records import packed_bars, packed_velocities, unpack, zero_records
+from .core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint, velocity_gradients
 from .core.boundary import solve
-from .core.grid import Storage, update
+from .core.grid import GridBox, Storage, update
 from .core.jit import CHUNKS
 from .core.law import kirchhoff_vjp, project_vjp
 from .core.order import slabs_of
+from .core.state import NONE
 from .core.surface import AT_NODES
-from .explicit import damp, gather, scatter
+from .explicit import damp, scatter
 from .materials import NoFlow
 
 
@@ -67,9 +70,10 @@ class StepAdjoint:
         law's and the flow's parameters added.
         """
         grid, free, touched = self._grid(bodies, t, dt)
+        moved = packed_velocities(grid)
         for body, bar, parts in zip(bodies, bars, sums):
-            self._deform(body, self._velocity_gradient(body, grid, dt), bar, parts, dt)
-        return self._transfer(bodies, bars, (grid, free, touched), dt)
+            self._deform(body, moved, bar, parts, dt)
+        return self._transfer(bodies, bars, (grid._replace(v=free), moved, touched), dt)
 
     def _grid(self, bodies, t, dt):
         """Return the grid of the step, its velocities before conditions, and the contacts of its
@@ -78,44 +82,40 @@ class StepAdjoint:
         scheme = self.scheme
         grid = scatter(bodies, self.storage, scheme, dt)
         update(grid, self.gravity, dt, scheme.mass_eps, scheme.gravity_on_empty)
-        free, touched = grid.v.copy(), ([], [], [])
+        free, touched = grid.v, ([], [], [])
         if self.conditions is not None:
-            touched = self.conditions.touched(grid, t + dt, dt)
+            free, touched = grid.v.copy(), self.conditions.touched(grid, t + dt, dt)
             solve(*touched, grid)
         return grid, free, touched
 
-    def _velocity_gradient(self, body, grid, dt):
-        """Return L of the step (N, d, d); the body keeps its own."""
-        q = body.particles
-        L = np.empty_like(q.L)
-        C = L if q.L is q.C else q.C.copy()
-        moved = body._replace(particles=q._replace(x=q.x.copy(), v=q.v.copy(), C=C, L=L))
-        gather(moved, grid, self.scheme, dt)
-        return L
-
-    def _deform(self, body, L, bar, parts, dt):
+    def _deform(self, body, moved, bar, parts, dt):
         """Compute the bars of F and y before the step, and of C and L, one array in MLS-MPM without
-        relaxation.
+        relaxation; moved has the velocities of nodes, as a grid of records.
         """
-        deform_body_adjoint(body, L, bar, parts, dt)
+        velocity_gradients(body.particles.x, moved, bar.L, self._exchange(dt))
         damp(body._replace(particles=bar), self.scheme)         # symmetric, hence its own adjoint
-        if self.scheme.one_gradient:
-            bar.C[:] += bar.L
+        deform_body_adjoint(body, bar.L, bar, parts, dt, self.scheme.one_gradient)
+
+    def _exchange(self, dt):
+        scheme = self.scheme
+        return Exchange(scheme.stencil, dt, scheme.share(dt), scheme.transfer == "mls")
 
     def _transfer(self, bodies, bars, step, dt):
         """Pull bars of x, v, C, L after the step back to x, v, C, tau, m, V0, b before it."""
-        scheme, (grid, free, touched) = self.scheme, step
-        nodes = self.storage_of_bars.cover([body.particles.x for body in bodies])
-        how = Exchange(scheme.stencil, dt, scheme.share(dt), scheme.transfer == "mls")
+        scheme, (grid, moved, touched) = self.scheme, step
+        nodes = self.storage_of_bars.zeroed(GridBox(grid.origin, grid.m.shape, grid.v.dtype.type))
+        how = self._exchange(dt)
+        of_moved = zero_records(nodes)
         for body, bar in zip(bodies, bars):
             slabs = slabs_of(body.particles.x, grid, scheme.stencil)
-            g2p_adjoint(body.particles, grid, bar, nodes, how, slabs)
-        grid = grid._replace(v=free)
+            g2p_adjoint(body.particles, moved, bar, of_moved, how, slabs)
+        unpack(of_moved, nodes)
         solve_adjoint(touched, grid, nodes)
         options = Update(dt, scheme.mass_eps, scheme.gravity_on_empty)
         of_gravity = update_adjoint(grid, nodes, self.gravity, options)
+        of_nodes = packed_bars(nodes)
         for body, bar in zip(bodies, bars):
-            p2g_adjoint(body.particles, nodes, bar, how)
+            p2g_adjoint(body.particles, of_nodes, bar, how)
         return of_gravity
 
 
@@ -137,20 +137,30 @@ def require_adjoint(body):
                              f"expected one of {', '.join(sorted(c.__name__ for c in known))}")
 
 
-def deform_body_adjoint(body, L, bar, parts, dt):
+def deform_body_adjoint(body, L, bar, parts, dt, one_gradient=False):
     """Apply the adjoint of `explicit.deform_body` with velocity gradient L: bar.F and bar.y of the
-    values after the step become those before it, bar.L is overwritten; bar.tau is read. Raises
-    ValueError for a law or a flow without adjoint.
+    values after the step become those before it, and bar.L is overwritten; with one_gradient bar.L
+    is left, and the bar of L is added to bar.C. bar.tau is read. L may be the array of bar.L.
+    Raises ValueError for a law or a flow without adjoint.
     """
     require_adjoint(body)
-    q, law, flow, bars = body.particles, body.law, body.flow, _of_deformation(bar)
+    q, law, flow = body.particles, body.law, body.flow
+    bars = _of_deformation(bar)._replace(C=bar.C if one_gradient else NONE)
     step = DeformStep(q.F, q.y, L, parts, dt)
-    if q.F.ndim == 1:
-        deform_adjoint.fluid(step, bars, law)
-    elif isinstance(flow, NoFlow):
-        deform_adjoint.elastic(step, bars, law)
-    else:
-        deform_adjoint.plastic(step, bars, law, flow)
+    with_flow = () if q.F.ndim == 1 or isinstance(flow, NoFlow) else (flow,)
+    _driver(body)(step, bars, law, *with_flow)
+
+
+def _driver(body):
+    """Return the loop over particles by which `deform_body_adjoint` differentiates a body."""
+    if body.particles.F.ndim == 1:
+        return deform_adjoint.fluid
+    if not isinstance(body.flow, NoFlow):
+        return deform_adjoint.plastic
+    for by_blocks in (corotated, strain):
+        if by_blocks.fits(body.law, body.particles.x.shape[1]):
+            return by_blocks.elastic
+    return deform_adjoint.elastic
 
 
 def clip_adjoint(positions, bars, low, high):
@@ -171,4 +181,4 @@ def initial_stress_adjoint(body, bar, parts):
 
 
 def _of_deformation(bar):
-    return DeformBars(bar.F, bar.tau, bar.L, bar.y)
+    return DeformBars(bar.F, bar.tau, bar.L, bar.y, NONE)

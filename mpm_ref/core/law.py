@@ -36,7 +36,8 @@ intact = by_type("intact")                # (y, flow) -> 1.0, or 0.0 where the m
 
 # Adjoint: `X_bar` is the gradient of a scalar loss by X. See `core.adjoint.deform`.
 kirchhoff_vjp = by_type("kirchhoff_vjp")  # (s, T, law) -> U^T F_bar V, where T = U^T tau_bar U
-kirchhoff_vjp_of_polar = by_type("kirchhoff_vjp_of_polar")  # (F, (V, R), tau_bar, law) -> F_bar
+corotated = by_type("corotated")          # (J, law) -> a, p, dp/dJ of tau = a (F F^T - V) + p(J) I
+strain_moduli = by_type("strain_moduli")  # (law) -> a, b of tau = a eps + b (tr eps) I
 units = by_type("units")                  # (law) -> laws of one modulus 1, the others 0
 d_pressure = by_type("d_pressure")        # (J, law) -> d pressure / dJ
 project_vjp = by_type("project_vjp")      # (state, bars, dt, law, flow) -> bars, parameters, share

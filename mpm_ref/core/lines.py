@@ -25,11 +25,13 @@ _1, _2, _3, _4, _5, _6, _7, _8, _9, _10, _11 = (np.uint64(k) for k in range(1, 1
 
 @kernel
 def times(a, x):
-    """Return a x of a vector."""
+    """Return a x of a vector, or of four numbers."""
     if len(x) == 2:
         return a * x[0], a * x[1]
-    else:
+    elif len(x) == 3:
         return a * x[0], a * x[1], a * x[2]
+    else:
+        return a * x[0], a * x[1], a * x[2], a * x[3]
 
 
 @kernel

@@ -33,7 +33,6 @@ from .tensor import (
     mv,
     numbers,
     plus_diagonal,
-    scale,
     scale_columns,
     trace,
     transpose,
@@ -73,19 +72,12 @@ def polar(F):
 @kernel
 def rotation(F):
     """R of `polar` to round-off; three times as fast where F is far from singular and inverted."""
-    R, ok = rotation_without_svd(F)
-    if ok:
-        return R
+    if is_moderate(F):
+        R, ok = _fast_rotation(F)
+        if ok:
+            return R
     U, _, V, _ = svd(F)
     return mmt(U, V)
-
-
-@kernel
-def rotation_without_svd(F):
-    """`rotation` and True, or anything and False: F is close to singular, inverted, huge, tiny."""
-    if is_moderate(F):
-        return _fast_rotation(F)
-    return F, False
 
 
 @kernel
@@ -161,19 +153,6 @@ def d_singular(U, V, dF):
     Repeated singular values have no differential, but symmetric functions of them do, as their sum.
     """
     return diagonal(mm(transpose(U), mm(dF, V)))
-
-
-@kernel
-def skew_quotient(A, V):
-    """Skew Z of Z V + V Z = A - A^T for a symmetric V in 3D, no two eigenvalues of which add to 0.
-
-    Of axial vectors it says ((tr V) I - V) z = a.
-    """
-    M = plus_diagonal(mlin(-1.0, V, 0.0, V), trace(V))
-    K = cofactor(M)
-    a = A[2][1] - A[1][2], A[0][2] - A[2][0], A[1][0] - A[0][1]
-    x, y, z = mv(scale(1.0 / dot(M[0], K[0]), K), a)
-    return (0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)
 
 
 @kernel

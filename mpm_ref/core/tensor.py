@@ -90,11 +90,14 @@ def fill(s, like):
 
 @kernel
 def lin(a, x, b, y):
-    """a x + b y of vectors."""
+    """a x + b y of vectors, or of four numbers each."""
     if len(x) == 2:
         return a * x[0] + b * y[0], a * x[1] + b * y[1]
-    else:
+    elif len(x) == 3:
         return a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2]
+    else:
+        return (a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2],
+                a * x[3] + b * y[3])
 
 
 @kernel

@@ -87,10 +87,11 @@ for _law, _file in ((FixedCorotated, fixed_corotated), (Hencky, hencky),
         _function.method(_law, getattr(_file, _function.__name__))
     law.kirchhoff_vjp.method(_law, principal.kirchhoff_vjp)
 law.kirchhoff_of_stretch.method(FixedCorotated, fixed_corotated.kirchhoff_of_stretch)
-law.kirchhoff_vjp_of_polar.method(FixedCorotated, fixed_corotated.kirchhoff_vjp_of_polar)
+law.corotated.method(FixedCorotated, fixed_corotated.corotated)
 for _function in (principal.pk1_hat, principal.dpk1_hat, principal.pair):
     _function.method(YieldingHencky, getattr(yielding_hencky, _function.__name__))
 law.kirchhoff_of_strain.method(Hencky, hencky.kirchhoff_of_strain)
+law.strain_moduli.method(Hencky, hencky.strain_moduli)
 law.pressure.method(Fluid, fluid.pressure)
 law.d_pressure.method(Fluid, fluid.d_pressure)
 law.psi_volume.method(Fluid, fluid.psi_volume)

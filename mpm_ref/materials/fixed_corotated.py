@@ -12,20 +12,15 @@ through inversion; there, b_ij would be -inf and is bounded.
 from typing import NamedTuple
 
 from ..core.jit import kernel
-from ..core.spectral import rotation, skew_quotient, stretch
+from ..core.spectral import rotation, stretch
 from ..core.tensor import (
-    cofactor,
-    dot,
     fill,
     identity,
     inner,
     lin,
     mlin,
-    mm,
     mmt,
     mul,
-    trace,
-    transpose,
 )
 from . import fluid, principal
 from .moduli import lame
@@ -96,20 +91,9 @@ def kirchhoff_hat(s, law):
 
 
 @kernel
-def kirchhoff_vjp_of_polar(F, parts, tau_bar, law):
-    """Return F_bar of tau = `kirchhoff_of_stretch` at F = V R, parts = (V, R), det F not near 0.
-
-    With T the symmetric part of tau_bar and its spin Z = `skew_quotient`(T V, V), which turns R as
-    F changes:  F_bar = 2 mu (2 T F - (T + Z) R) + lam (2 J - 1) (tr T) cof F
-    """
-    V, R = parts
-    T = mlin(0.5, tau_bar, 0.5, transpose(tau_bar))
-    Z = skew_quotient(mm(T, V), V)
-    turned = mm(mlin(1.0, T, 1.0, Z), R)
-    shear = mlin(4.0 * law.mu, mm(T, F), -2.0 * law.mu, turned)
-    K = cofactor(F)
-    J = dot(F[0], K[0])
-    return mlin(1.0, shear, law.lam * (2.0 * J - 1.0) * trace(T), K)
+def corotated(J, law):
+    """Return a, p and dp/dJ [Pa] of tau = a (F F^T - V) + p(J) I."""
+    return 2.0 * law.mu, fluid.pressure(J, law), fluid.d_pressure(J, law)
 
 
 @kernel

@@ -121,6 +121,12 @@ def kirchhoff_of_strain(eps, law):
 
 
 @kernel
+def strain_moduli(law):
+    """Return a, b [Pa] of tau = a eps + b tr(eps) I."""
+    return 2.0 * law.mu, law.lam
+
+
+@kernel
 def kirchhoff_hat(s, law):
     """Return the principal tau_i = 2 mu eps_i + lam sum(eps) [Pa]."""
     eps = log_strain(s)

@@ -23,6 +23,7 @@ from ..adjoint import (
 )
 from ..core.adjoint.boundary import solve_adjoint
 from ..core.adjoint.grid import Update, update_adjoint
+from ..core.adjoint.records import packed_bars, packed_velocities, unpack, zero_records
 from ..core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint
 from ..core.boundary import solve
 from ..core.grid import Storage
@@ -191,13 +192,15 @@ def adjoint_stages(problem, bodies, forward, seeds, when):
         deformation_adjoint(body, forward[f"{body.name}/L"], (bar, parts), (scheme, dt), arrays)
     exchange = Exchange(scheme.stencil, dt, scheme.flip, scheme.transfer == "mls")
     nodes = storage(problem).cover([body.particles.x for body in bodies])
+    moved, of_moved = packed_velocities(grid), zero_records(nodes)
     for body, bar in zip(bodies, bars):
         slabs = slabs_of(body.particles.x, grid, scheme.stencil)
-        g2p_adjoint(body.particles, grid, bar, nodes, exchange, slabs)
+        g2p_adjoint(body.particles, moved, bar, of_moved, exchange, slabs)
         arrays[f"{body.name}/x_g2p_grad"] = bar.x.copy()
+    unpack(of_moved, nodes)
     grid_adjoint(problem, (grid._replace(v=v_free), contacts), nodes, dt, arrays)
     for body, bar, parts in zip(bodies, bars, sums):
-        p2g_adjoint(body.particles, nodes, bar, exchange)
+        p2g_adjoint(body.particles, packed_bars(nodes), bar, exchange)
         initial_stress_adjoint(body, bar, parts)
         put_particle_bars(body, bar, parts, arrays)
     return {key: a[full] if a.shape[:full.ndim] == full.shape and "/" not in key else a

@@ -4,15 +4,20 @@ as torch's automatic differentiation of the formulas.
 
 import numpy as np
 import pytest
-from deform_bars import DT, apart, materials, named, seeds, states
+from deform_bars import DT, apart, materials, matter, named, seeds, states
 from problems import run_python
 from threads import MOST, by_threads
 
-from mpm_ref.core.adjoint import deform
+from mpm_ref.adjoint import deform_body_adjoint
+from mpm_ref.body import Body
+from mpm_ref.core.adjoint import corotated, deform, strain
+from mpm_ref.core.corotated import BLOCK
 from mpm_ref.core.jit import CHUNKS
-from mpm_ref.materials import FixedCorotated, NoFlow
+from mpm_ref.materials import FixedCorotated, Hencky, NoFlow
 
-CASES = {"von_mises_hardening": 3, "none on fixed_corotated": 3, "fluid of J": 2}
+CASES = {"von_mises_hardening": 3, "none on fixed_corotated": 3, "none on hencky": 3,
+         "fluid of J": 2}
+BLOCKS = {"none on fixed_corotated": corotated, "none on hencky": strain}
 N = 150             # more particles than chunks
 CODE = f"""
 import json
@@ -42,7 +47,7 @@ def driven(name):
     if q.F.ndim == 1:
         deform.fluid(step, bars, law)
     elif isinstance(flow, NoFlow):
-        deform.elastic(step, bars, law)
+        BLOCKS[name].elastic(step, bars, law)
     else:
         deform.plastic(step, bars, law, flow)
     return bars, step.sums
@@ -75,20 +80,65 @@ def test_as_the_plain_text(plain, name):
     assert max(apart(named(*driven(name), law, flow), expected).values()) < 1e-13
 
 
-def test_without_singular_values_as_with_them():
+@pytest.mark.parametrize("n", [N, CHUNKS * (BLOCK + 7)], ids=["parts of blocks", "blocks"])
+@pytest.mark.parametrize("law", [FixedCorotated(300.0, 500.0), Hencky(300.0, 500.0)],
+                         ids=["fixed_corotated", "hencky"])
+def test_without_singular_values_as_with_them(law, n):
     """Far from singular, through rest, and where the loop falls back to singular values."""
-    law = FixedCorotated(300.0, 500.0)
     rng = np.random.default_rng(6)
-    s = np.exp(0.3 * rng.standard_normal((N, 3)))
-    s[:20], s[20:40, 2], s[40:60] = 1.0, 1e-3, s[40:60] * (1.0, 1.0, -1.0)
-    q = states(rng, s, (law, NoFlow(), False))
+    s = np.exp(0.3 * rng.standard_normal((n, 3)))
+    s[:20], s[20:40, 2] = 1.0, 0.1
+    if isinstance(law, Hencky):
+        run = strain
+    else:
+        run, s[20:40, 2], s[40:60] = corotated, 1e-3, s[40:60] * (1.0, 1.0, -1.0)
+    q = states(rng, rng.permutation(s), (law, NoFlow(), False))
     found = []
-    for run in (deform.elastic_vjp_of_polar, deform.elastic_vjp):
-        bars, step, like = seeds(q, law, NoFlow())
-        for c in range(CHUNKS):
-            run(step, bars, law, like, c)
+    for module in (run, deform):
+        bars, step, _ = seeds(q, law, NoFlow())
+        module.elastic(step, bars, law)
         found.append(named(bars, step.sums, law, NoFlow()))
     assert max(apart(*found).values()) < 1e-13
+
+
+@pytest.mark.parametrize("size", [0.003, 0.1, 0.39, 0.41, 0.59])
+def test_derivative_of_a_strain_of_any_size(size):
+    """On both sides of the size from which singular values are used: to round-off of both."""
+    law, rng = Hencky(300.0, 500.0), np.random.default_rng(8)
+    eps = rng.standard_normal((N, 3))
+    s = np.exp(size * eps / np.linalg.norm(eps, axis=1)[:, None])
+    q, found = states(rng, s, (law, NoFlow(), False)), []
+    for module in (strain, deform):
+        bars, step, _ = seeds(q, law, NoFlow())
+        module.elastic(step, bars, law)
+        found.append(bars)
+    assert np.abs(found[0].F - found[1].F).max() < 1e-14 * np.abs(found[1].F).max()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_body_is_differentiated_by_the_loop_of_its_material(name):
+    q, (law, flow, _) = scattered(name), materials(CASES[name])[name]
+    bars, step, _ = seeds(q, law, flow)
+    body = Body("body", matter(q), law, flow, np.arange(N))
+    deform_body_adjoint(body, q.L, bars, step.sums, DT)
+    assert bits(bars, step.sums) == bits(*driven(name))
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_bar_of_a_shared_gradient_joins_that_of_C(name):
+    """Where L and C are one field."""
+    law, flow, _ = materials(3)[name]
+    q = scattered(name)
+    for run in (BLOCKS[name], deform):
+        apart_bars, step, _ = seeds(q, law, flow)
+        joined, again, _ = seeds(q, law, flow)
+        C = np.random.default_rng(7).standard_normal(q.L.shape)
+        joined = joined._replace(L=again.L, C=C.copy())
+        run.elastic(step, apart_bars, law)
+        run.elastic(again, joined, law)
+        assert np.array_equal(joined.C, C + apart_bars.L)
+        assert np.array_equal(joined.F, apart_bars.F)
+        assert np.array_equal(joined.L, q.L)
 
 
 @pytest.mark.skipif(MOST < 2, reason="one core")

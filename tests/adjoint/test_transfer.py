@@ -8,6 +8,7 @@ from adjoints import (
     direction,
     g2p_bars,
     g2p_loss,
+    how_of,
     inputs_of,
     inside_cells,
     like_grid,
@@ -22,7 +23,9 @@ from clouds import Case, cloud, scattered
 from problems import run_python
 from threads import MOST, by_threads
 
+from mpm_ref.core.adjoint.records import packed_velocities
 from mpm_ref.core.adjoint.shape_gradient import curvatures
+from mpm_ref.core.adjoint.transfer import velocity_gradients
 from mpm_ref.core.spline import STENCILS, slopes
 from mpm_ref.core.transfer import rpic
 
@@ -170,15 +173,33 @@ def test_curvatures_are_slopes_of_slopes(degree, rng):
         assert rise / 0.2 == pytest.approx(np.array(curvatures(f, STENCILS[degree])), abs=1e-13)
 
 
-@pytest.mark.skipif(MOST < 2, reason="one core")
-def test_two_threads_give_the_same_bits(case):
+def bits_are_the_same(case):
+    """Whether one thread and two give the same bars, of particles and of nodes, and the same L."""
     rng = np.random.default_rng(7)
     q = cloud(case, rng, 200, width=12.0)
     grid = like_grid(scattered(case, q, DT), rng)
     seeds = direction(q, rng, ("x", "v", "C", "L"))
 
     def bars():
+        L = np.empty((len(q.x), case.d, case.d))
+        velocity_gradients(q.x, packed_velocities(grid), L, how_of(case))
         bars, nodes = g2p_bars(case, q, grid, seeds)
-        return *bars, nodes.v, nodes.v_old, *p2g_bars(case, q, nodes)
+        return L, *bars, nodes.v, nodes.v_old, *p2g_bars(case, q, nodes)
 
-    assert all(np.array_equal(a, b) for a, b in zip(*by_threads(bars)))
+    return all(np.array_equal(a, b) for a, b in zip(*by_threads(bars)))
+
+
+@pytest.mark.skipif(MOST < 2, reason="one core")
+@pytest.mark.parametrize("case", [*CASES, Case("apic", 2, 3), Case("pic", 3, 3)],
+                         ids=lambda case: case.name)
+def test_two_threads_give_the_same_bits(case):
+    assert bits_are_the_same(case)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(MOST < 2, reason="one core")
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize("transfer", ["pic", "flip", "apic", "mls"])
+def test_two_threads_give_the_same_bits_for_every_form(transfer, degree, d):
+    assert bits_are_the_same(Case(transfer, degree, d))

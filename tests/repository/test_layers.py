@@ -25,8 +25,10 @@ FLOORS = (
     ("core.grid", "core.deform", "core.corotated", "core.levelset",
      "core.transfer core.transfer_lines core.transfer_mls3 core.relaxation"),
     ("core.motion", "core.contact", "core.displacement", "core.f_bar", "core.sparse_grid",
-     "core.adjoint.transfer core.adjoint.transfer_mls3",
-     "core.adjoint.grid", "core.adjoint.deform"),
+     "core.adjoint.transfer core.adjoint.transfer_lines core.adjoint.transfer_mls3 "
+     "core.adjoint.moments core.adjoint.records core.adjoint.slopes",
+     "core.adjoint.grid", "core.adjoint.deform core.adjoint.corotated core.adjoint.strain "
+     "core.adjoint.blocks core.adjoint.block_steps"),
     ("core.mass_nodes",),
     ("core.boundary",),
     ("core.adjoint.boundary", "core.surface", "core.body_contact core.crowded_nodes"),

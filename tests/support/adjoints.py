@@ -3,6 +3,7 @@
 import numpy as np
 from clouds import AFFINE, DX, cloud, deep, scattered
 
+from mpm_ref.core.adjoint.records import packed_bars, packed_velocities, unpack, zero_records
 from mpm_ref.core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint
 from mpm_ref.core.order import slabs_of
 from mpm_ref.core.state import Particles
@@ -82,7 +83,7 @@ def p2g_loss(case, q, nodes):
 def p2g_bars(case, q, nodes):
     """Its gradient with respect to particles."""
     bars = zeros(q)
-    p2g_adjoint(q, nodes, bars, how_of(case))
+    p2g_adjoint(q, packed_bars(nodes), bars, how_of(case))
     return bars
 
 
@@ -98,7 +99,9 @@ def g2p_bars(case, q, grid, seeds):
     """Its gradient with respect to particles and to nodes."""
     bars = Particles(*(a.copy() for a in seeds))
     nodes = grid._replace(v=np.zeros_like(grid.v), v_old=np.zeros_like(grid.v_old))
-    g2p_adjoint(q, grid, bars, nodes, how_of(case), slabs_of(q.x, grid, case.stencil))
+    of_moved, slabs = zero_records(grid), slabs_of(q.x, grid, case.stencil)
+    g2p_adjoint(q, packed_velocities(grid), bars, of_moved, how_of(case), slabs)
+    unpack(of_moved, nodes)
     return bars, nodes
 
 

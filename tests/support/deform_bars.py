@@ -13,6 +13,7 @@ from constitutive import LAW, rate, rotations, transpose
 from flows import CASES, setting
 
 from mpm_ref.core import deform
+from mpm_ref.core.adjoint import corotated, strain
 from mpm_ref.core.adjoint import deform as adjoint
 from mpm_ref.core.adjoint.deform import DeformBars, DeformStep
 from mpm_ref.core.jit import CHUNKS
@@ -120,12 +121,17 @@ def gradients(q, law, flow):
         if q.F.ndim == 1:
             adjoint.fluid_vjp(step, bars, law, like, c)
         elif isinstance(flow, NoFlow):
-            polar = adjoint.has_polar(law, len(like))
-            run = adjoint.elastic_vjp_of_polar if polar else adjoint.elastic_vjp
-            run(step, bars, law, like, c)
+            serial_elastic(law, len(like))(step, bars, law, like, c)
         else:
             adjoint.plastic_vjp(step, bars, law, flow, like, c)
     return named(bars, step.sums, law, flow)
+
+
+def serial_elastic(law, d):
+    """The loop over a chunk that differentiates a law without a flow."""
+    if corotated.fits(law, d):
+        return corotated.elastic_blocks
+    return strain.elastic_strain_blocks if strain.fits(law, d) else adjoint.elastic_vjp
 
 
 def loss_at_start(q, law, flow):
@@ -160,7 +166,7 @@ def at_start(q):
 def seeds(q, law, flow):
     """Bars before an adjoint pass, the step it goes through, and a tuple of length d."""
     w_F, w_tau, w_y = q.weights
-    bars = DeformBars(w_F.copy(), w_tau, np.full_like(q.L, np.nan), w_y.copy())
+    bars = DeformBars(w_F.copy(), w_tau, np.full_like(q.L, np.nan), w_y.copy(), NONE)
     sums = np.zeros((CHUNKS, len(law) + len(flow)))
     return bars, DeformStep(q.F, q.y, q.L, sums, DT), tuple(range(q.L.shape[1]))
 

@@ -6,8 +6,9 @@ For every quantity X, `X_bar` (in arrays: bars.X) is d loss / dX. Given the bars
 leaves, these functions put in their place those of what it found, write the bar of L, and add the
 bars of the parameters. NCLaw's training differentiates the same step (NCLAW-eq5).
 
-All but fixed corotated elasticity is differentiated in the principal axes F_trial = U diag(s) V^T,
-where it falls apart into a function of s and, for each pair of axes, two numbers:
+The step is differentiated in the principal axes F_trial = U diag(s) V^T (for some laws without
+them, see `adjoint.corotated`), where it falls apart into a function of s and, for each pair of
+axes, two numbers:
 (s'_i - s'_j)/(s_i - s_j) for the symmetric part and (s'_i + s'_j)/(s_i + s_j) for the skew part.
 The laws give the first in closed form, so that repeated singular values need no care. A return map
 is differentiated in the branch that it takes.
@@ -27,22 +28,19 @@ from ..law import (
     gap_ratio,
     intact,
     kirchhoff_hat,
-    kirchhoff_of_stretch,
     kirchhoff_vjp,
-    kirchhoff_vjp_of_polar,
     pressure,
     project,
     project_vjp,
     units,
 )
-from ..spectral import UNDETERMINED, mixed, rotation_without_svd, svd
+from ..spectral import UNDETERMINED, mixed, svd
 from ..state import growth
 from ..tensor import (
     cofactor,
     det,
     diagonal,
     dot,
-    inner,
     mat,
     mlin,
     mm,
@@ -59,6 +57,7 @@ class DeformBars(NamedTuple):
     tau: np.ndarray     # (N, d, d)  of tau after the step; left alone
     L: np.ndarray       # (N, d, d)  on return of the velocity gradient of the step
     y: np.ndarray       # (N,)       as F, where the return map has a memory, else as in `state`
+    C: np.ndarray       # (N, d, d)  that of L is added to it in place of L, or (0,)
 
 
 class DeformStep(NamedTuple):
@@ -78,13 +77,7 @@ def fluid(step, bars, law):
 
 def elastic(step, bars, law):
     """Adjoint of `deform.elastic`."""
-    like = _like(step.L)
-    (_elastic_of_polar if has_polar(law, len(like)) else _elastic)(step, bars, law, like)
-
-
-def has_polar(law, d):
-    """Return whether `elastic_vjp_of_polar` is for the law in d dimensions."""
-    return d == 3 and type(law) in kirchhoff_vjp_of_polar.methods
+    _elastic(step, bars, law, _like(step.L))
 
 
 def plastic(step, bars, law, flow):
@@ -111,7 +104,8 @@ def fluid_vjp(step, bars, law, like, c):
         J = step.F[p] * grown
         J_bar = bars.F[p] + pressure_vjp(J, bars.tau[p], law, step.sums, c)
         bars.F[p] = J_bar * grown
-        put_mat(bars.L, p, mlin(step.dt * J_bar * step.F[p], cofactor(G), 0.0, G))
+        L_bar = mlin(step.dt * J_bar * step.F[p], cofactor(G), 0.0, G)
+        put_gradient_bar(bars.L, bars.C, p, L_bar)
 
 
 @kernel
@@ -119,26 +113,7 @@ def elastic_vjp(step, bars, law, like, c):
     """Adjoint of F' = (I + dt L) F, tau = kirchhoff(F')."""
     start, stop = chunk(c, len(step.F))
     for p in range(start, stop):
-        U, s, V, _ = svd(trial(step, p, like))
-        T = within(U, mat(bars.tau, p, like), U)
-        X = stress_vjp(s, T, law, step.sums, c)
-        put_trial_bar(step, bars, p, mlin(1.0, mat(bars.F, p, like), 1.0, back(U, X, V)), like)
-
-
-@kernel
-def elastic_vjp_of_polar(step, bars, law, like, c):
-    """`elastic_vjp` in 3D for laws that have `kirchhoff_vjp_of_polar`: without singular values,
-    where F is neither close to singular nor inverted.
-    """
-    start, stop = chunk(c, len(step.F))
-    for p in range(start, stop):
-        F, tau_bar = trial(step, p, like), mat(bars.tau, p, like)
-        R, ok = rotation_without_svd(F)
-        if ok:
-            F_bar = stress_vjp_of_polar(F, R, tau_bar, law, (step.sums, c))
-        else:
-            U, s, V, _ = svd(F)
-            F_bar = back(U, stress_vjp(s, within(U, tau_bar, U), law, step.sums, c), V)
+        F_bar = principal_bar(trial(step, p, like), mat(bars.tau, p, like), law, step.sums, c)
         put_trial_bar(step, bars, p, mlin(1.0, mat(bars.F, p, like), 1.0, F_bar), like)
 
 
@@ -183,6 +158,13 @@ def initial_pressure_vjp(J, bars, law, sums, c):
 
 
 @kernel
+def principal_bar(F, tau_bar, law, sums, c):
+    """F_bar of tau_bar, in principal axes; the bars of the moduli join the sums of chunk c."""
+    U, s, V, _ = svd(F)
+    return back(U, stress_vjp(s, within(U, tau_bar, U), law, sums, c), V)
+
+
+@kernel
 def trial(step, p, like):
     """F_trial of particle p."""
     return mm(growth(step.L, p, step.dt, like), mat(step.F, p, like))
@@ -193,7 +175,16 @@ def put_trial_bar(step, bars, p, trial_bar, like):
     """The bars of F and L of particle p from that of F_trial = (I + dt L) F."""
     G, F = growth(step.L, p, step.dt, like), mat(step.F, p, like)
     put_mat(bars.F, p, mm(transpose(G), trial_bar))
-    put_mat(bars.L, p, mlin(step.dt, mmt(trial_bar, F), 0.0, F))
+    put_gradient_bar(bars.L, bars.C, p, mlin(step.dt, mmt(trial_bar, F), 0.0, F))
+
+
+@kernel
+def put_gradient_bar(L, C, p, L_bar):
+    """Store the bar of L, or add it to that of C where both are one field."""
+    if C.ndim == 3:
+        put_mat(C, p, mlin(1.0, mat(C, p, L_bar), 1.0, L_bar))
+    else:
+        put_mat(L, p, L_bar)
 
 
 @kernel
@@ -215,15 +206,6 @@ def stress_vjp(s, T, law, sums, c):
     for k in range(len(alone)):
         sums[c, k] += dot(diagonal(T), kirchhoff_hat(s, alone[k]))
     return kirchhoff_vjp(s, T, law)
-
-
-@kernel
-def stress_vjp_of_polar(F, R, tau_bar, law, row):
-    """F_bar of tau_bar at F with the rotation R; the bars of the moduli join row = (sums, c)."""
-    (sums, c), V, alone = row, mmt(R, F), units(law)
-    for k in range(len(alone)):
-        sums[c, k] += inner(tau_bar, kirchhoff_of_stretch(F, V, alone[k]))
-    return kirchhoff_vjp_of_polar(F, (V, R), tau_bar, law)
 
 
 @kernel
@@ -270,12 +252,6 @@ def _fluid(step, bars, law, like):
 def _elastic(step, bars, law, like):
     for c in prange(CHUNKS):
         elastic_vjp(step, bars, law, like, c)
-
-
-@parallel
-def _elastic_of_polar(step, bars, law, like):
-    for c in prange(CHUNKS):
-        elastic_vjp_of_polar(step, bars, law, like, c)
 
 
 @parallel

@@ -3,13 +3,15 @@
 A bar is the gradient of the loss with respect to the field of the same name; bars of particles
 stand in a `Particles`, those of nodes in a `Grid`. What the transfer gathers its adjoint scatters,
 and the other way round. Names as in `transfer`; a_ip is the `shape_gradient` of a pair.
+`scatter_bars` and `gather_bars` are as plain as the sums are; `g2p_adjoint` and `p2g_adjoint` run
+in parallel the same sums written for speed, `transfer_lines`, which are tested against them.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import CHUNKS, chunk, kernel, parallel, prange
+from ..jit import kernel
 from ..state import NONE, add_body_force, affine, body_force, full, put_full
 from ..stencil import (
     add_to_node,
@@ -18,11 +20,9 @@ from ..stencil import (
     columns,
     gradient,
     inverse_inertia,
-    locate,
     node,
     of_node,
     product,
-    weights_per_axis,
 )
 from ..tensor import (
     dot,
@@ -38,7 +38,6 @@ from ..tensor import (
     vec,
     vm,
 )
-from ..transfer import minus_old
 from ..transfer_mls3 import fits
 from .shape_gradient import (
     GradientForm,
@@ -48,17 +47,18 @@ from .shape_gradient import (
     shape_gradient,
     shape_gradient_bar,
 )
-from .transfer_mls3 import gather_bars_mls3_all, scatter_bars_mls3_color
-
-
-class Advection(NamedTuple):
-    """Positions of particles before g2p, and the bars of sum_i w_ip v_i and, with relaxation, of
-    C_p - sum_i w_ip v_old_i r_ip^T D^-1, else (0,).
-    """
-
-    x: np.ndarray       # (N, d)
-    u: np.ndarray       # (N, d)
-    lag_affine: np.ndarray   # (N, d, d)
+from .transfer_lines import (
+    Advection,
+    Motion,
+    OfArms,
+    OfSlopes,
+    gather_joined_all,
+    gather_separate_all,
+    gradients_all,
+    scatter_bars_color,
+    scatter_lag_color,
+    velocities_all,
+)
 
 
 class Exchange(NamedTuple):
@@ -123,38 +123,13 @@ def plus_lag_arm(x, lag_affine, p, scale, v_old_i):
         return x
 
 
-@kernel
-def velocities(particles, grid, stencil, u, lag, bounds):
-    """u_p = sum_i w_ip v_i and lag_p = v_p - sum_i w_ip v_old_i, for the particles bounds[0] ..
-    bounds[1] - 1.
-    """
-    d = grid.m.shape
-    for p in range(bounds[0], bounds[1]):
-        base, s = locate(vec(particles.x, p, d), grid, stencil)
-        w, u_p, lag_p = weights_per_axis(s, stencil), fill(0.0, d), vec(particles.v, p, d)
-        for c in range(columns(s, stencil)):
-            k = column(c, stencil, d)
-            for l in range(len(stencil)):
-                i, w_ip = node(base, k, l), product(k, l, w)
-                u_p = lin(1.0, u_p, w_ip, of_node(grid.v, i))
-                lag_p = minus_old(lag_p, w_ip, grid.v_old, i)
-        put_vec(u, p, u_p)
-        put_vec(lag, p, lag_p)
-
-
-@parallel
-def _velocities(particles, grid, stencil, u, lag):
-    for c in prange(CHUNKS):
-        velocities(particles, grid, stencil, u, lag, chunk(c, len(particles.x)))
-
-
 def add_spin_bars(particles, grid, bars, of_u, how):
     """Adjoint of `shift_spin`: with A = D^-1 (C_p - C_p^T) of the bars C_p,
 
     u_p += flip dt/2 A lag_p,    v_p -= flip dt/2 A u_p        (u_p in `of_u`, v_p in `bars`)
     """
     u, lag = np.empty_like(of_u), np.empty_like(of_u)
-    _velocities(particles, grid, how.stencil, u, lag)
+    velocities_all(particles, grid, how.stencil, u, lag)
     scale = 0.5 * how.flip * how.dt * inverse_inertia(grid.dx, how.stencil)
     A = scale * (bars.C - np.swapaxes(bars.C, 1, 2))
     of_u += np.einsum("pab,pb->pa", A, lag)
@@ -256,17 +231,15 @@ def force_bar(f, i, v_i, dt):
         return of_node(f, i)
 
 
-@parallel
-def _scatter_color(advection, grid, bars, nodes, stencil, slabs):
-    for h in prange(len(slabs.start) // 2):
-        members = slabs.order[slabs.start[2 * h] : slabs.start[2 * h + 1]]
-        scatter_bars(advection, grid, bars, nodes, stencil, members)
-
-
-@parallel
-def _gather(particles, nodes, bars, stencil, form):
-    for c in prange(CHUNKS):
-        gather_bars(particles, nodes, bars, stencil, form, chunk(c, len(particles.x)))
+def velocity_gradients(x, grid, L, how):
+    """Compute L (N, d, d) of g2p for particles at x (N, d), to the bit, from a grid of records."""
+    if not how.mls:
+        form = OfSlopes(1.0, 1.0 / grid.dx)
+    else:
+        D_inv = inverse_inertia(grid.dx, how.stencil)
+        at_once = grid.v_old.ndim > 1 or fits(grid, how.stencil, how.mls)
+        form = OfArms(1.0, grid.dx * D_inv) if at_once else OfArms(grid.dx, D_inv)
+    gradients_all(x, grid, L, how.stencil, form)
 
 
 def g2p_adjoint(particles, grid, bars, nodes, how, slabs):
@@ -274,36 +247,40 @@ def g2p_adjoint(particles, grid, bars, nodes, how, slabs):
     v, C, L after it add to those of nodes (v, v_old) and become those of x, v and with relaxation
     C before it.
 
-    Slabs of one colour run in parallel (see `p2g`). Under MLS without relaxation the bar of C is
-    that of L too, and bars.L is not read.
+    grid and nodes are grids of records (see `records`). Slabs of one colour run in parallel (see
+    `p2g`). Under MLS without relaxation the bar of C is that of L too, and bars.L is not read.
     """
     remembers = grid.v_old.ndim > 1
     relaxed = remembers and bars.C.ndim == 3
-    advection = Advection(particles.x, bars.v + how.dt * bars.x,
-                          how.flip * bars.C if relaxed else NONE)
-    bars.v[:] *= how.flip if remembers else 0.0
+    of_grid = bars._replace(L=NONE) if how.mls else bars
     if relaxed:
-        add_spin_bars(particles, grid, bars, advection.u, how)
-    of_grid = bars
-    if how.mls:
-        of_grid = bars._replace(C=bars.C + bars.L if relaxed else bars.C, L=NONE)
-    fast = not remembers and fits(grid, how.stencil, how.mls)
-    run = scatter_bars_mls3_color if fast else _scatter_color
-    for color in (0, 1):
-        of_color = slabs._replace(start=slabs.start[color:])
-        run(advection, grid, of_grid, nodes, how.stencil, of_color)
+        motion = relaxation_bars(particles, grid, bars, how)
+        of_grid = of_grid._replace(C=bars.C + bars.L) if how.mls else of_grid
+    else:
+        motion = Motion(particles.x, NONE, how.dt, how.flip if remembers else 0.0)
+    for run in (scatter_bars_color, scatter_lag_color)[: 2 if remembers else 1]:
+        for color in (0, 1):
+            of_color = slabs._replace(start=slabs.start[color:])
+            run(motion, grid, of_grid, nodes, how.stencil, of_color)
     if relaxed:
-        bars.C[:] = advection.lag_affine
+        bars.C[:] = motion.lag_affine
+
+
+def relaxation_bars(particles, grid, bars, how):
+    """Return the `Advection` of particles whose C relaxes; bars of v become those of their lag."""
+    motion = Advection(particles.x, bars.v + how.dt * bars.x, how.flip * bars.C)
+    bars.v[:] *= how.flip
+    add_spin_bars(particles, grid, bars, motion.u, how)
+    return motion
 
 
 def p2g_adjoint(particles, nodes, bars, how):
-    """Adjoint of `p2g`: from the bars `nodes` of m, v, f to those of particles; those of x, v, b,
-    m, V0 and with relaxation C are added to, those of tau and else of C overwritten.
+    """Adjoint of `p2g`: from the bars `nodes` of m, v, f, as a grid of records, to those of
+    particles; those of x, v, b, m, V0 and with relaxation C are added to, those of tau and else of
+    C overwritten.
     """
-    if nodes.f.ndim == 1 and fits(nodes, how.stencil, how.mls):
-        gather_bars_mls3_all(particles, nodes, bars, how.stencil, how.dt)
-        return
     form = GradientForm(how.dt)
     if how.mls:
         form = MlsForm(how.dt, inverse_inertia(nodes.dx, how.stencil))
-    _gather(particles, nodes, bars, how.stencil, form)
+    run = gather_joined_all if nodes.f.ndim == 1 else gather_separate_all
+    run(particles, nodes, bars, how.stencil, form)

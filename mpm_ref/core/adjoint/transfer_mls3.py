@@ -1,8 +1,9 @@
-"""The adjoint of the transfer that most scenes use, for speed: MLS form, quadratic splines, 3D.
+"""The adjoint of the transfer of NCLaw, MLS form, quadratic splines, 3D, on plain grids.
 
-The sums of `scatter_bars` and `gather_bars` of `adjoint.transfer`, line by line as in
-`transfer_mls3`. Both have in common a field U_ip = U_p + Q_p r_ip, affine in the node's position,
-of which sum_i w_ip h_ip with h_ip = v_i . U_ip is differentiated:
+A batch of bodies has one small grid for each (see `nclaw.batched_step`). The sums are those of
+`scatter_bars` and `gather_bars` of `adjoint.transfer`, line by line as in `transfer_mls3`. Both
+have in common a field U_ip = U_p + Q_p r_ip, affine in the node's position, of which sum_i w_ip
+h_ip with h_ip = v_i . U_ip is differentiated:
 
     x_p += sum_i h_ip dw_ip - Q_p^T sum_i w_ip v_i
 
@@ -10,7 +11,7 @@ Where the field is scattered as well, it is formed at the three nodes of a line 
 and h with it; otherwise the sums are moments of v.
 """
 
-from ..jit import CHUNKS, chunk, kernel, parallel, prange
+from ..jit import kernel
 from ..lines import _1, _2, _3, node_number, strides
 from ..state import add_body_force, affine, body_force, full, put_affine, put_full
 from ..stencil import inverse_inertia, locate, slopes_per_axis, weights_per_axis
@@ -185,18 +186,3 @@ def with_line(slope, h, splines, a, b):
     H = dot(w[2], h)
     return (slope[0] + dw[0][a] * w[1][b] * H, slope[1] + w[0][a] * dw[1][b] * H,
             slope[2] + w[0][a] * w[1][b] * dot(dw[2], h))
-
-
-@parallel
-def scatter_bars_mls3_color(advection, grid, bars, nodes, stencil, slabs):
-    """`scatter_bars_mls3` for the slabs of one colour, in parallel."""
-    for h in prange(len(slabs.start) // 2):
-        members = slabs.order[slabs.start[2 * h] : slabs.start[2 * h + 1]]
-        scatter_bars_mls3(advection, grid, bars, nodes, stencil, members)
-
-
-@parallel
-def gather_bars_mls3_all(particles, nodes, bars, stencil, dt):
-    """`gather_bars_mls3` for all particles, in parallel."""
-    for c in prange(CHUNKS):
-        gather_bars_mls3(particles, nodes, bars, stencil, dt, chunk(c, len(particles.x)))

@@ -52,10 +52,10 @@ class MaterialFunction(Function):
         (law, flow), G, zero = ctx.records, G.contiguous().numpy(), np.zeros(G.shape)
         sums = np.zeros((CHUNKS, len(law) + len(flow)))
         if isinstance(flow, NoFlow):
-            bars = DeformBars(zero, G, zero, NO_HISTORY)
+            bars = DeformBars(zero, G, zero, NO_HISTORY, NONE)
             deform_adjoint.initial_stress(ctx.F, NO_HISTORY, bars, law, flow, sums)
         else:
-            bars = DeformBars(G.copy(), zero, zero.copy(), NO_HISTORY)
+            bars = DeformBars(G.copy(), zero, zero.copy(), NO_HISTORY, NONE)
             at_rest = DeformStep(ctx.F, NO_HISTORY, zero, sums, 0.0)
             deform_adjoint.plastic(at_rest, bars, law, flow)
         return torch.from_numpy(bars.F), torch.from_numpy(sums.sum(axis=0)), None
