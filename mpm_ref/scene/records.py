@@ -173,8 +173,19 @@ class Arrays(Record):
             raise ValueError("the key `file` is missing")
 
 
+class Source(Record):
+    """The stream of a body whose shape is filled again and again (see `streams.Source`)."""
+
+    start: Annotated[float, Meta(ge=0, le=1e12)] = 0.0      # time of the first block [s]
+    stop: Positive | None = None                # no block enters from then on [s]
+    length: Length | None = None                # of a block along its velocity [m]
+    hold: bool = True                           # nodes in the shape have that velocity meanwhile
+
+
 class Body(Record):
-    """Particles of one material: a shape and how to fill it, or arrays from a file."""
+    """Particles of one material: a shape and how to fill it, or arrays from a file; with a source,
+    a stream of blocks of that shape.
+    """
 
     name: Name
     material: Material
@@ -183,6 +194,7 @@ class Body(Record):
     particles: Arrays | None = None
     density: Positive | None = None             # at rest [kg/m^3]
     velocity: Velocity = Velocity()
+    source: Source | None = None
 
     def __post_init__(self):
         if (self.shape is None) == (self.particles is None):
@@ -191,6 +203,23 @@ class Body(Record):
             raise ValueError("a body with a shape needs `density`")
         if self.particles is not None and self.sampling != Regular():
             raise ValueError("`sampling` is for a body with a shape, not for `particles`")
+        if self.source is not None:
+            self._check_source()
+
+    def _check_source(self):
+        if self.shape is None:
+            raise ValueError("`source` is for a body with a shape, not for `particles`")
+        if self.velocity.linear is None or not any(self.velocity.linear):
+            raise ValueError("a body with a source needs `velocity.linear`, with which its blocks "
+                             "enter")
+        if self.velocity.angular not in (0.0, (0.0, 0.0, 0.0)):
+            raise ValueError("`velocity.angular` is for a body without source, whose blocks do not "
+                             "turn")
+        if self.material.is_neural:
+            raise ValueError(f"`source` with the law {NEURAL!r}: expected a law by its name")
+        if self.source.stop is not None and not self.source.start < self.source.stop:
+            raise ValueError(f"source.stop = {self.source.stop}: expected a time after start = "
+                             f"{self.source.start}")
 
 
 class Steady(Kind, tag="steady"):
@@ -258,6 +287,13 @@ class Fixed(Record):
     follows: bool = True                        # the region moves along
     since: Time = 0.0                           # it holds from here
     until: Time | None = None                   # ... to here; released afterwards
+    name: str = ""
+
+
+class Sink(Record):
+    """A shape that takes particles out of the run (see `streams.Sink`)."""
+
+    shape: Analytic
     name: str = ""
 
 
@@ -369,6 +405,7 @@ class Scene(Record, dict=True):
     solver: Solver | None = None
     collider: tuple[Collider, ...] = ()
     fixed: tuple[Fixed, ...] = ()
+    sink: tuple[Sink, ...] = ()
     walls: Walls | None = None
     boundary: Literal["nodes", "surface"] = "nodes"     # where the conditions of colliders hold
     contact: tuple[BodyContact, ...] = ()           # of bodies with each other
