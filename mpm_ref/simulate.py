@@ -80,7 +80,8 @@ def start(problem, stepper):
     """
     state = State(problem.bodies)
     stepper.start(filled(state.bodies))
-    stepper.start(tuple(source.entering(0, source.start) for source in problem.sources))
+    for source in problem.sources:
+        stepper.start((source.entering(0, source.start),))
     check(problem, state, 0.0)
     stepper.storage.cover([body.particles.x for body in filled(state.bodies)])
     state.account = account(problem, state.bodies)

@@ -76,6 +76,11 @@ class Source:
         """Return the time at which block k enters [s]; infinite after the last one."""
         return self.start + k * self.period if k < self.blocks else inf
 
+    def whole(self):
+        """Return the body with all particles of the run, each where its block is sampled."""
+        body = change_rows(self.block, lambda a: np.concatenate(self.blocks * [a]))
+        return body._replace(id=np.arange(self.particles))
+
     def entering(self, k, t):
         """Return block k as it enters at time t [s], with its stress."""
         moved = self.velocity * (t - self.time(k))
@@ -130,8 +135,7 @@ def total_bodies(problem):
     """
     bodies = list(problem.bodies)
     for source in problem.sources:
-        whole = change_rows(source.block, lambda a: np.concatenate(source.blocks * [a]))
-        bodies[source.body] = whole._replace(id=np.arange(source.particles))
+        bodies[source.body] = source.whole()
     return tuple(bodies)
 
 

@@ -1,10 +1,11 @@
 """Export results as VTKHDF, the file format of VTK and ParaView, with h5py alone.
 
 Particles become temporal PolyData: one vertex each, the topology stored once for all frames, or for
-each of them where particles enter and leave. The grid becomes ImageData: nodal density and velocity, computed again from the particles by the PIC
-transfer, in one box of nodes at integer multiples of dx as in the run. Values are in single
-precision, for display; the results file has them in double. 2D lies in the plane z = 0. Format:
-VTKHDF specification, version 2.0 (docs.vtk.org).
+each of them where particles enter and leave. The grid becomes ImageData: nodal density and
+velocity, computed again from the particles by the PIC transfer, in one box of nodes at integer
+multiples of dx as in the run. Values are in single precision, for display; the results file has
+them in double. 2D lies in the plane z = 0. Format: VTKHDF specification, version 2.0
+(docs.vtk.org).
 """
 
 import numpy as np
