@@ -53,6 +53,7 @@ def test_a_source_that_starts_later_has_no_particle_at_first():
 def test_a_scene_is_written_and_read_back():
     scene = loads(stream(2, "stop = 0.2", more=sink()))
     assert loads(dumps(scene)) == scene
+    assert "[[sink]]" in dumps(scene)
     assert canonical(scene) != canonical(loads(stream(2, "stop = 0.3", more=sink())))
     assert canonical(scene) != canonical(loads(stream(2, "stop = 0.2")))
 

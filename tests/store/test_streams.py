@@ -78,6 +78,8 @@ def test_exports_have_the_particles_that_are_there(results, tmp_path):
         for k, (a, n) in enumerate(zip(starts, counts, strict=True)):
             x = results.field("jet", "x", k)[results.present("jet", k)]
             assert root["Points"][a:a + n, :results.dim] == pytest.approx(x, rel=1e-6)
+            v = results.field("jet", "v", k)[results.present("jet", k)]
+            assert root["PointData/v"][a:a + n, :results.dim] == pytest.approx(v, rel=1e-6)
             assert root["Vertices/Connectivity"][a:a + n].tolist() == list(range(n))
             assert root["Vertices/Offsets"][a + k:a + k + n + 1].tolist() == list(range(n + 1))
         assert not np.isnan(root["Points"][()]).any()
