@@ -67,8 +67,8 @@ class Problem:
     strain_bounds: dict = field(default_factory=dict)   # {body: strains of its laws' training}
     budget: EnergyBudget | None = None  # to which an explicit run adds its steps
     contacts: tuple = ()                # of BodyContact between bodies
-    sources: tuple = ()                 # of streams.Source, from which particles enter
-    sinks: tuple = ()                   # of streams.Sink, where they leave
+    sources: tuple = ()                 # of streams.ParticleSource, from which particles enter
+    sinks: tuple = ()                   # of streams.ParticleSink, where they leave
 
     def __post_init__(self):
         if not self.bodies:

@@ -27,7 +27,7 @@ MOST = 50_000_000               # particles of a source in a run
 
 
 @dataclass(frozen=True)
-class Source:
+class ParticleSource:
     """A block of particles that enters a run again and again, one block behind the other.
 
     Raises ValueError for times, a velocity or a number of particles that make no stream.
@@ -76,7 +76,7 @@ class Source:
         """Return the time at which block k enters [s]; infinite after the last one."""
         return self.start + k * self.period if k < self.blocks else inf
 
-    def whole(self):
+    def all_particles(self):
         """Return the body with all particles of the run, each where its block is sampled."""
         body = change_rows(self.block, lambda a: np.concatenate(self.blocks * [a]))
         return body._replace(id=np.arange(self.particles))
@@ -92,7 +92,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Sink:
+class ParticleSink:
     """A shape (see `core.levelset`) that takes the particles out of a run that are in it after a
     step.
     """
@@ -135,7 +135,7 @@ def total_bodies(problem):
     """
     bodies = list(problem.bodies)
     for source in problem.sources:
-        bodies[source.body] = source.whole()
+        bodies[source.body] = source.all_particles()
     return tuple(bodies)
 
 

@@ -55,13 +55,12 @@ from .records import (
     Ramps,
     Scene,
     Scheme,
-    Sink,
     Solver,
-    Source,
     Steady,
     Velocity,
     Walls,
 )
+from .stream_records import Sink, Stream
 from .toml import canonical, digest, dumps, load, loads
 
 __all__ = [
@@ -107,9 +106,9 @@ __all__ = [
     "Scheme",
     "Sink",
     "Solver",
-    "Source",
     "Sphere",
     "Steady",
+    "Stream",
     "Torus",
     "Transformed",
     "Union",

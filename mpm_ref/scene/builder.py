@@ -42,7 +42,7 @@ class SceneParts(NamedTuple):
     conditions: Conditions | None
     solver: object              # `hot.methods.Options`; None for the explicit integrator
     contacts: tuple             # of BodyContact between bodies
-    sinks: tuple                # of streams.Sink
+    sinks: tuple                # of streams.ParticleSink
     materials: tuple            # of (law, flow) for each body; None where a file holds them
 
 

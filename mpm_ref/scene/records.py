@@ -32,6 +32,7 @@ from ..shapes.quantities import (
     Vector,
 )
 from .quantity_records import Quantities
+from .stream_records import Sink, Stream, check_source
 
 Name = Annotated[str, Meta(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9_. -]+\Z")]
 Time = Annotated[float, Meta(ge=-1e12, le=1e12)]                        # [s]
@@ -173,15 +174,6 @@ class Arrays(Record):
             raise ValueError("the key `file` is missing")
 
 
-class Source(Record):
-    """The stream of a body whose shape is filled again and again (see `streams.Source`)."""
-
-    start: Annotated[float, Meta(ge=0, le=1e12)] = 0.0      # time of the first block [s]
-    stop: Positive | None = None                # no block enters from then on [s]
-    length: Length | None = None                # of a block along its velocity [m]
-    hold: bool = True                           # nodes in the shape have that velocity meanwhile
-
-
 class Body(Record):
     """Particles of one material: a shape and how to fill it, or arrays from a file; with a source,
     a stream of blocks of that shape.
@@ -194,7 +186,7 @@ class Body(Record):
     particles: Arrays | None = None
     density: Positive | None = None             # at rest [kg/m^3]
     velocity: Velocity = Velocity()
-    source: Source | None = None
+    source: Stream | None = None
 
     def __post_init__(self):
         if (self.shape is None) == (self.particles is None):
@@ -204,22 +196,7 @@ class Body(Record):
         if self.particles is not None and self.sampling != Regular():
             raise ValueError("`sampling` is for a body with a shape, not for `particles`")
         if self.source is not None:
-            self._check_source()
-
-    def _check_source(self):
-        if self.shape is None:
-            raise ValueError("`source` is for a body with a shape, not for `particles`")
-        if self.velocity.linear is None or not any(self.velocity.linear):
-            raise ValueError("a body with a source needs `velocity.linear`, with which its blocks "
-                             "enter")
-        if self.velocity.angular not in (0.0, (0.0, 0.0, 0.0)):
-            raise ValueError("`velocity.angular` is for a body without source, whose blocks do not "
-                             "turn")
-        if self.material.is_neural:
-            raise ValueError(f"`source` with the law {NEURAL!r}: expected a law by its name")
-        if self.source.stop is not None and not self.source.start < self.source.stop:
-            raise ValueError(f"source.stop = {self.source.stop}: expected a time after start = "
-                             f"{self.source.start}")
+            check_source(self)
 
 
 class Steady(Kind, tag="steady"):
@@ -287,13 +264,6 @@ class Fixed(Record):
     follows: bool = True                        # the region moves along
     since: Time = 0.0                           # it holds from here
     until: Time | None = None                   # ... to here; released afterwards
-    name: str = ""
-
-
-class Sink(Record):
-    """A shape that takes particles out of the run (see `streams.Sink`)."""
-
-    shape: Analytic
     name: str = ""
 
 

@@ -10,7 +10,7 @@ from ..core.motion import Motion, Steady
 from ..shapes import Analytic, level_set
 from ..shapes.inside import check_bounded, solid
 from ..simulate import last_step
-from ..streams import Sink, Source, blocks_until
+from ..streams import ParticleSink, ParticleSource, blocks_until
 from .messages import SceneError, errors_at
 
 
@@ -45,14 +45,14 @@ def end_of(clock):
 
 
 def build_sources(scene, bodies):
-    """Return the `streams.Source`s of a checked scene, whose bodies are one block each."""
+    """Return the `streams.ParticleSource`s of a checked scene, whose bodies are one block each."""
     found, end = [], end_of(scene.parts.clock)
     for k, record in flowing(scene):
         with errors_at(f"body[{k}].source"):
             v, length, stop = stream_of(record)
             period = length / float(np.linalg.norm(v))
             blocks = blocks_until((record.source.start, period), stop, end)
-            found.append(Source(k, bodies[k], v, length, record.source.start, blocks))
+            found.append(ParticleSource(k, bodies[k], v, length, record.source.start, blocks))
     return tuple(found)
 
 
@@ -100,11 +100,11 @@ def length_along(shape, v):
 
 
 def build_sinks(scene):
-    """Return the `streams.Sink`s of a scene."""
+    """Return the `streams.ParticleSink`s of a scene."""
     sinks = []
     for k, record in enumerate(scene.sink):
         with errors_at(f"sink[{k}].shape"):
             shape = level_set(record.shape)
             distances(np.zeros((1, scene.dim)), shape)
-        sinks.append(Sink(shape, record.name))
+        sinks.append(ParticleSink(shape, record.name))
     return tuple(sinks)

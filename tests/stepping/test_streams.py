@@ -14,7 +14,7 @@ from mpm_ref.explicit import Scheme
 from mpm_ref.monitor import Unstable
 from mpm_ref.problem import Problem
 from mpm_ref.simulate import simulate
-from mpm_ref.streams import Sink, Source, blocks_until, total_bodies
+from mpm_ref.streams import ParticleSink, ParticleSource, blocks_until, total_bodies
 
 PERIOD = LENGTH / SPEED
 FREE = "hold = false"
@@ -265,7 +265,7 @@ def test_what_makes_no_stream_is_refused():
                          ((v, 0.1, 0.0, 0), "at least one block"),
                          ((v, 0.1, 0.0, 10**7), "particles in all")):
         with pytest.raises(ValueError, match=reason):
-            Source(0, block, *keys)
+            ParticleSource(0, block, *keys)
 
 
 @pytest.mark.parametrize(("keys", "reason"), [
@@ -276,7 +276,7 @@ def test_parts_that_know_no_streams_refuse_them(keys, reason):
     one = two_disks()
     if keys.get("bodies", 1) is None:
         keys = {"bodies": tuple(select_rows(b, b.id < 0) for b in one.bodies)}
-    sinks = (Sink(half_space((0.0, 0.0), (0.0, 1.0))),)
+    sinks = (ParticleSink(half_space((0.0, 0.0), (0.0, 1.0))),)
     with pytest.raises(ValueError, match=reason):
         Problem(**{"bodies": one.bodies, "dx": one.dx, "clock": one.clock,
                    "gravity": one.gravity, "sinks": sinks} | keys)

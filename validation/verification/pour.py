@@ -3,7 +3,7 @@
 What enters less what left is in the run. A jet without strength leaves the source with v0 and falls
 freely, v^2 = v0^2 + 2 g h, so that a sink at depth H below takes rho A v0 in the steady state, and
 rho A v0 t_H are in flight, t_H = (sqrt(v0^2 + 2 g H) - v0)/g. A steady jet of water whose momentum
-is all turned aside by a smooth plate pushes it with rho A v0^2 [Batchelor1967].
+is all turned aside by a smooth plate pushes it with rho A v0^2.
 """
 
 from dataclasses import replace
