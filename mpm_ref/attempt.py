@@ -11,7 +11,7 @@ it is made as it is, and the monitor ends the run.
 
 import numpy as np
 
-from .body import keep_inside
+from .body import filled, keep_inside
 from .core.displacement import largest_speed, speed_bound
 from .monitor import check, lost, runs_away
 
@@ -26,18 +26,18 @@ def take_step(problem, stepper, state, dt):
     is the step. The length is that of the last part, of an explicit step with fixed dt all of it.
     Raises `Unstable` where the shortest part fails too.
     """
-    parts, done, reports = 1, 0, []
+    parts, done, reports, bodies = 1, 0, [], filled(state.bodies)
     while done < parts:
         part = dt / parts
-        grid = stepper.advance_grid(state.bodies, state.t + done * part, part)
+        grid = stepper.advance_grid(bodies, state.t + done * part, part)
         fault = fault_of(problem, stepper, state, grid, part)
         again = fault is not None and (parts > 1 or may_retry(problem, stepper, state, dt))
         if again and parts < 2**HALVINGS:
             parts, done, state.rejected = 2 * parts, 2 * done, state.rejected + 1
             continue
-        stepper.update_particles(state.bodies, grid, part)
+        stepper.update_particles(bodies, grid, part)
         if problem.clip is not None:
-            keep_inside(state.bodies, *problem.clip)
+            keep_inside(bodies, *problem.clip)
         reports.append(stepper.report)
         if again:
             give_up(problem, state, reports[-1], part, fault)
@@ -55,7 +55,7 @@ def fault_of(problem, stepper, state, grid, dt):
         return f"the implicit step was not solved: {solve.message}"
     slack = max(SLACK, float(np.finfo(problem.scheme.real).eps))
     limit = (1.0 - slack) * problem.limits.cfl * problem.dx / dt
-    parts, scheme = stepper.parts(grid, state.bodies), stepper.scheme
+    parts, scheme = stepper.parts(grid, filled(state.bodies)), stepper.scheme
     if all(speed_bound(*part) <= limit for part in parts):
         return None
     if all(largest_speed(body.particles, part, scheme.stencil, scheme.share(dt)) <= limit

@@ -80,12 +80,46 @@ def permute(body, order):
     body.id[:] = body.id[order]
 
 
-def restore_order(values, number):
+def change_rows(body, change):
+    """Return a body with change(a) in place of each array a with an entry for each particle; C and
+    L stay one array where they are.
+    """
+    q = body.particles
+    new = Particles(*(change(a) if len(a) == len(body.id) else a for a in q))
+    if q.L is q.C:
+        new = new._replace(L=new.C)
+    return body._replace(particles=new, id=change(body.id))
+
+
+def select_rows(body, which):
+    """Return a body with the particles of a mask (N,) alone, in their order; arrays are copied."""
+    return change_rows(body, lambda a: a[which])
+
+
+def append(body, more):
+    """Return a body with the particles of another one of the same kind behind its own."""
+    both = zip(body.particles, more.particles, strict=True)
+    joined = Particles(*(np.concatenate(pair) for pair in both))
+    if body.particles.L is body.particles.C:
+        joined = joined._replace(L=joined.C)
+    return body._replace(particles=joined, id=np.concatenate([body.id, more.id]))
+
+
+def filled(bodies):
+    """Return the bodies that have particles."""
+    return tuple(body for body in bodies if len(body.id))
+
+
+def restore_order(values, number, size=None):
     """Return rows (N, ..) in the order in which their body was sampled.
 
     A run sorts particles now and then; number (N,) is the body's `id`, the first place of each.
+    With a size > N, of a body whose particles enter and leave, rows without particle are NaN.
     """
-    ordered = np.empty_like(values)
+    if size in (None, len(values)):
+        ordered = np.empty_like(values)
+    else:
+        ordered = np.full((size, *values.shape[1:]), np.nan, values.dtype)
     ordered[number] = values
     return ordered
 

@@ -113,7 +113,7 @@ class ContactStepper(Stepper):
                              "grids of all fields, such as that of core.boundary.Conditions")
         self.contacts = tuple(contacts)
         self.stores = {}
-        self.rules = None       # `FieldRules`, from `start` on
+        self.rules = None       # `FieldRules`, from `start` or the first step on
 
     def start(self, bodies):
         """Start as `Stepper.start`. Raises ValueError for contacts that do not fit the bodies."""
@@ -136,6 +136,8 @@ class ContactStepper(Stepper):
     def accelerate(self, bodies, dt):
         """Return the grids with the velocities that forces, gravity and contact give in dt [s]."""
         grids, scheme = [], self.scheme
+        if self.rules is None:          # of a run that is resumed, which does not `start`
+            self.rules = field_rules(self.contacts, self.fields(bodies))
         for k, field in enumerate(self.fields(bodies)):
             if k not in self.stores:
                 self.stores[k] = Storage(self.dx, scheme.stencil, len(self.gravity),

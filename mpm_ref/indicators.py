@@ -71,6 +71,13 @@ def is_elastic(body):
     return body.particles.F.ndim > 1 and isinstance(body.flow, NoFlow)
 
 
+def lasting(problem):
+    """Return the bodies of a problem whose particles are the same from the start to the end."""
+    growing = {source.body for source in problem.sources}
+    return [body for k, body in enumerate(problem.bodies)
+            if k not in growing and not problem.sinks]
+
+
 # formulas
 
 def widest_gap(X, x, neighbours):
@@ -114,11 +121,13 @@ def energy_lost(start, least, lowest):
 def conserves_energy(problem):
     """Return whether a run of a problem loses no mechanical energy but by its discretisation: one
     of explicit steps, since backward Euler takes energy by design, without return maps, friction,
-    moving parts, body forces of particles and a box that keeps them, and with laws that have an
-    energy.
+    moving parts, sources, sinks, body forces of particles and a box that keeps them, and with laws
+    that have an energy.
     """
     bodies, conditions = problem.bodies, problem.conditions
     if problem.integrator != "explicit" or problem.clip is not None:
+        return False
+    if problem.sources or problem.sinks:
         return False
     if any(body.particles.b.ndim > 1 or type(body.law) not in psi.methods
            or not isinstance(body.flow, NoFlow) for body in bodies):
@@ -174,7 +183,7 @@ class IndicatorWatch:
     def __init__(self, problem):
         """Prepare to watch a run of a problem whose bodies stand as they start."""
         self._problem = problem
-        self._rest = {body.name: at_rest(body) for body in problem.bodies}
+        self._rest = {body.name: at_rest(body) for body in lasting(problem)}
         self._conserves = conserves_energy(problem)
         self._start = energy(problem.bodies, problem.gravity, problem.inertia)
         self._least, self._lowest = self._start.sum, self._start.gravity
@@ -202,7 +211,8 @@ class IndicatorWatch:
     def _measured(self, state):
         """Yield (name, value, body's name) of all indicators of a state."""
         for body in state.bodies:
-            yield from self._measured_body(body, state.t)
+            if body.name in self._rest:
+                yield from self._measured_body(body, state.t)
         if self._conserves:
             now = energy(state.bodies, self._problem.gravity, self._problem.inertia)
             self._least = min(self._least, now.sum)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .body import filled
 from .core.law import psi
 from .energy import Energy, energy
 from .materials import stiffness
@@ -66,6 +67,13 @@ class Account:
         available = self.start.kinetic + self.start.elastic + released
         return self.start.sum + growth * available + self.noise
 
+    def changed(self, energy, sign, noise):
+        """Return the account of a run into which an `Energy` came (sign = 1) or from which it went
+        (-1), with the noise [J] of the particles that carry it.
+        """
+        start = Energy(*(a + sign * b for a, b in zip(self.start, energy, strict=True)))
+        return Account(start, self.noise + noise)
+
 
 def account(problem, bodies):
     """Return the `Account` of a run's first state; None where moving conditions or body forces of
@@ -74,12 +82,17 @@ def account(problem, bodies):
     driven = any(b.particles.b.ndim > 1 or type(b.law) not in psi.methods for b in bodies)
     if driven or (problem.conditions is not None and getattr(problem.conditions, "moves", True)):
         return None
+    return Account(energy(bodies, problem.gravity, problem.inertia),
+                   noise_of(problem, bodies) + 1e-300)
+
+
+def noise_of(problem, bodies):
+    """Return what round-off may add to the energy of bodies [J]."""
     mass = sum(float(b.particles.m.sum()) for b in bodies)
     noise = 1e-6 * mass * float(np.linalg.norm(problem.gravity)) * problem.dx
     if problem.scheme.precision == "single":
         noise += sum(rounding_of_heights(b.particles, problem.gravity) for b in bodies)
-    noise += sum(REST**2 * stiffness(b.law) * float(b.particles.V0.sum()) for b in bodies)
-    return Account(energy(bodies, problem.gravity, problem.inertia), noise + 1e-300)
+    return noise + sum(REST**2 * stiffness(b.law) * float(b.particles.V0.sum()) for b in bodies)
 
 
 def rounding_of_heights(particles, gravity):
@@ -93,7 +106,7 @@ def runs_away(problem, state, dt):
     every step, before the grid follows such a particle.
     """
     most = problem.limits.cfl * problem.dx / dt
-    velocities = (body.particles.v for body in state.bodies)
+    velocities = (body.particles.v for body in filled(state.bodies))
     return not all(-most <= v.min() and v.max() <= most for v in velocities)
 
 
@@ -153,7 +166,7 @@ def lost(problem, state, dt, reason):
     """Return an `Unstable` for a reason that concerns the run as a whole: its fastest particle is
     named.
     """
-    body = max(state.bodies, key=lambda b: speed(b.particles).max())
+    body = max(filled(state.bodies), key=lambda b: speed(b.particles).max())
     return unstable(problem, state, body, int(np.argmax(speed(body.particles))), dt, reason)
 
 

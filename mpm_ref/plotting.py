@@ -187,10 +187,12 @@ def _name_bodies(points, bodies):
 
 
 def _dots(results, frame, field, window):
-    """Return the places, values and sizes of the particles from far to near; as wide as they lie
-    apart.
+    """Return the places, values and sizes of the particles that are there, from far to near; as
+    wide as they lie apart.
     """
     order = _order(results, frame, window.view)
+    there = np.concatenate([results.present(body, frame) for body in results.bodies])
+    order = order[there[order]]
     volume = np.concatenate([results.field(body, "V0") for body in results.bodies])
     sizes = (volume ** (1.0 / results.dim) * window.inches * POINT) ** 2
     x, values = _positions(results, frame)[:, window.view], _values(results, frame, field)

@@ -31,14 +31,23 @@ def misplaced(problem):
     where they have half as much material again as there is room, which is at a depth of one or two
     particle spacings; less is not detected. Thin is what is flat, not what is hollow.
     """
-    return [*_in_solids(problem), *_in_each_other(problem.bodies), *_thin(problem)]
+    bodies = starting(problem)
+    return [*_in_solids(problem, bodies), *_in_each_other(bodies), *_thin(problem)]
+
+
+def starting(problem):
+    """Return the bodies of a problem as they start; of a source that starts later, its block."""
+    bodies = list(problem.bodies)
+    for source in problem.sources:
+        bodies[source.body] = source.block
+    return bodies
 
 
 # in colliders and walls
 
-def _in_solids(problem):
+def _in_solids(problem, bodies):
     """Yield a sentence for each body that is partly in a solid, and for each such solid."""
-    for body in problem.bodies:
+    for body in bodies:
         for name, depth in depths_in_solids(problem, body.particles.x):
             inside = depth > ON * problem.dx
             if inside.any():

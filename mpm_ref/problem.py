@@ -12,6 +12,7 @@ from .hot.methods import SolverOptions
 from .hot.step import ImplicitStepper
 from .materials import recovers
 from .monitor import Limits
+from .streams import check_streams
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,8 @@ class Problem:
     strain_bounds: dict = field(default_factory=dict)   # {body: strains of its laws' training}
     budget: EnergyBudget | None = None  # to which an explicit run adds its steps
     contacts: tuple = ()                # of BodyContact between bodies
+    sources: tuple = ()                 # of streams.ParticleSource, from which particles enter
+    sinks: tuple = ()                   # of streams.ParticleSink, where they leave
 
     def __post_init__(self):
         if not self.bodies:
@@ -79,6 +82,7 @@ class Problem:
             raise ValueError(f"energy budget with the integrator {self.integrator!r}: expected "
                              "'explicit'")
         self._check_contacts()
+        check_streams(self)
 
     def _check_contacts(self):
         if not self.contacts:

@@ -10,8 +10,10 @@ from math import ceil, inf
 from typing import NamedTuple
 
 from .attempt import take_step
+from .body import filled
 from .core.grid import OutOfRange
 from .monitor import CHECK, Account, account, check, lost, runs_away
+from .streams import entry_speed, let_in, next_entry, take_out
 from .timestep import TimeStep, TooLarge, advective, refuse, stable_dt
 
 SORT = 64        # steps between physical sorts of the particles by cell
@@ -77,9 +79,11 @@ def start(problem, stepper):
     `core.grid.OutOfRange` where no grid covers it, `TooLarge` for a dt past its bound.
     """
     state = State(problem.bodies)
-    stepper.start(state.bodies)
+    stepper.start(filled(state.bodies))
+    for source in problem.sources:
+        stepper.start((source.entering(0, source.start),))
     check(problem, state, 0.0)
-    stepper.storage.cover([body.particles.x for body in state.bodies])
+    stepper.storage.cover([body.particles.x for body in filled(state.bodies)])
     state.account = account(problem, state.bodies)
     update_bound(problem, stepper, state)
     return state
@@ -96,14 +100,20 @@ def advance(problem, stepper, state):
     """Make one step: sort now and then, choose dt, step, clip, check. Return dt; of an implicit
     step in parts (see `attempt`), the length of the last part.
     """
-    if state.step % SORT == 0:
-        stepper.sort(state.bodies)
+    before, bodies = state.t, filled(state.bodies)
+    if state.step % SORT == 0 and bodies:
+        stepper.sort(bodies)
     if bound_is_due(problem.clock, state):
         update_bound(problem, stepper, state)
-    dt = next_dt(problem.clock, state, swiftest(problem, stepper, state))
-    dt = take_step(problem, stepper, state, dt)
+    dt = length_of_step(problem, stepper, state)
+    if bodies:
+        dt = take_step(problem, stepper, state, dt)
     state.step += 1
     state.t = state.step * problem.clock.dt if problem.clock.dt else state.t + dt
+    if problem.sinks:
+        take_out(problem, state)
+    if problem.sources and let_in(problem, state, before):
+        update_bound(problem, stepper, state)
     due = state.step % CHECK == 0 or ended(problem.clock, state)
     if due or runs_away(problem, state, dt):
         check(problem, state, dt)
@@ -125,7 +135,8 @@ def update_bound(problem, stepper, state):
 
     Raises `TooLarge`, and `Unstable` where no dt is stable.
     """
-    terms = stable_dt(state.bodies, stepper)
+    bodies = filled(state.bodies)
+    terms = stable_dt(bodies, stepper) if bodies else TimeStep(inf, inf, inf)
     if not terms.dt > 0.0:
         check(problem, state, 0.0)
         raise lost(problem, state, 0.0, f"no stable time step: {terms.sentence()}")
@@ -144,23 +155,35 @@ def swiftest(problem, stepper, state):
     clock = problem.clock
     if clock.dt is not None:
         return inf
-    particles = (body.particles for body in state.bodies)
-    bound = min(advective(q, problem.dx, 0.0, problem.gravity) for q in particles)
-    if not stepper.implicit:
+    bodies = filled(state.bodies)
+    bound = min((advective(body.particles, problem.dx, 0.0, problem.gravity) for body in bodies),
+                default=inf)
+    entering = entry_speed(problem.sources, state.t)
+    bound = min(bound, problem.dx / entering) if entering > 0.0 else bound
+    if not (stepper.implicit and bodies):
         return bound
-    u = stepper.driven_speed(state.bodies, state.t, AHEAD * min(next_dt(clock, state, bound), 1.0))
+    u = stepper.driven_speed(bodies, state.t, AHEAD * min(next_dt(clock, state, bound), 1.0))
     return min(bound, problem.dx / u) if u > 0.0 else bound
 
 
-def next_dt(clock, state, advective_bound):
+def length_of_step(problem, stepper, state):
+    """Return the length of the next step of a run [s], see `next_dt`; without particles, that to
+    the next event, or 0 where none is known.
+    """
+    until = next_entry(problem.sources, state.t)
+    dt = next_dt(problem.clock, state, swiftest(problem, stepper, state), until)
+    return dt if dt < inf or filled(state.bodies) else 0.0
+
+
+def next_dt(clock, state, advective_bound, until=inf):
     """Return the length of the next step [s]: fixed, or such that equal steps within the bounds
-    meet the next frame or the end.
+    meet the next frame, the end or the time `until` [s], whichever is first.
 
     Raises `TooLarge` where steps are so short that sums of them lose their last digit.
     """
     if clock.dt is not None:
         return clock.dt
-    target = clock.end if clock.end is not None else inf
+    target = until if clock.end is None else min(clock.end, until)
     if clock.interval is not None:
         target = min(target, state.frame * clock.interval)
     dt = min(clock.cfl * min(state.bound, advective_bound), clock.longest)

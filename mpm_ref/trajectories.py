@@ -52,10 +52,13 @@ def recorded(problem, kind, every=1):
     """Return the fields of a NamedTuple `kind`, of one point in `every`, over a run of a problem of
     one body that shows every step.
 
-    Raises ValueError for more bodies, and for a clock that shows fewer frames.
+    Raises ValueError for more bodies, for sources and sinks, and for a clock that shows fewer
+    frames.
     """
     if len(problem.bodies) != 1:
         raise ValueError(f"{len(problem.bodies)} bodies: expected one")
+    if problem.sources or problem.sinks:
+        raise ValueError("sources or sinks: expected a body whose particles are the same always")
     if problem.clock.dt is None:
         raise ValueError("the time step is adaptive: expected a fixed dt")
     rows = []

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from .. import scene
+from ..body import filled
 from ..energy_budget import Terms
 from ..nclaw.strain_watch import poor_law_warnings, time_step_warnings
 from ..preflight import misplaced
@@ -36,14 +37,17 @@ def of_problem(problem, state=None):
     stepper = problem.stepper()
     bounds = state.terms if state is not None else None
     if bounds is None:
-        bounds = stable_dt(problem.bodies, stepper)
-    grid = stepper.storage.cover([body.particles.x for body in problem.bodies])
+        bounds = stable_dt(filled(problem.bodies), stepper)
+    grid = stepper.storage.cover([body.particles.x for body in filled(problem.bodies)])
     clock = problem.clock
     return {
         "title": problem.title,
         "dim": problem.dim,
         "bodies": {body.name: len(body.id) for body in problem.bodies},
         "particles": sum(len(body.id) for body in problem.bodies),
+        "sources": {problem.bodies[one.body].name: {
+            "particles": one.particles, "blocks": one.blocks, "start": one.start,
+            "last": one.time(one.blocks - 1)} for one in problem.sources},
         "dx": problem.dx,
         "nodes": grid.m.size,
         "integrator": problem.integrator,
@@ -132,6 +136,9 @@ def problem_lines(facts):
     return [
         f"{facts['title'] or 'untitled'}: {facts['dim']}D, {facts['particles']} particles "
         f"({bodies}), dx = {facts['dx']:g} m, {facts['nodes']} nodes at the start",
+        *(f"source {name!r}: {counted(one['blocks'], 'block')} from t = {one['start']:.4g} s to "
+          f"{one['last']:.4g} s, {counted(one['particles'], 'particle')} in all"
+          for name, one in facts["sources"].items()),
         f"{length}, {step_line(facts)}; {method(facts)}",
         f"memory: particles {memory[0]}, grid {memory[1]}",
     ]

@@ -74,8 +74,9 @@ def make_world(problem):
         raise ValueError(f"{problem.title!r}: expected MLS-MPM with quadratic splines in 3D, "
                          "in double precision, without damping, relaxation or averaged volumes "
                          "(f_bar)")
-    if len(problem.bodies) != 1 or problem.clock.dt is None:
-        raise ValueError(f"{problem.title!r}: expected one body and a fixed dt")
+    flows = problem.sources or problem.sinks
+    if len(problem.bodies) != 1 or flows or problem.clock.dt is None:
+        raise ValueError(f"{problem.title!r}: expected one body, no source or sink, and a fixed dt")
     if clip is None or not is_nclaw_box(walls) or problem.conditions.parts:
         raise ValueError(f"{problem.title!r}: expected a box of walls of kind \"separate\" without "
                          "friction and a clip, nothing else")

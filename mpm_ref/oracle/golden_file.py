@@ -135,8 +135,8 @@ def is_golden(path):
 
 def require_recordable(problem):
     """Raise ValueError for names of bodies that cannot name groups of the file, for averaged
-    volumes, for conditions at surfaces, for contact of bodies, and for laws and flows that the
-    plain twin does not have.
+    volumes, for conditions at surfaces, for contact of bodies, for sources and sinks, and for laws
+    and flows that the plain twin does not have.
     """
     names = [body.name for body in problem.bodies]
     clash = sorted(reserved_names(problem.integrator) & set(names))
@@ -150,6 +150,9 @@ def require_recordable(problem):
     if problem.contacts:
         raise ValueError("contact of bodies: golden files have one velocity field; expected a "
                          "scene without it")
+    if problem.sources or problem.sinks:
+        raise ValueError("sources or sinks: golden files have the same particles in all steps; "
+                         "expected a scene without [body.source] and [[sink]]")
     if problem.scheme.precision != "double":
         raise ValueError(f"precision = {problem.scheme.precision!r}: golden files hold arrays of "
                          "double precision; expected 'double', which any backend may be compared "

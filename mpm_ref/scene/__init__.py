@@ -60,6 +60,7 @@ from .records import (
     Velocity,
     Walls,
 )
+from .stream_records import Sink, Stream
 from .toml import canonical, digest, dumps, load, loads
 
 __all__ = [
@@ -103,9 +104,11 @@ __all__ = [
     "Scene",
     "SceneError",
     "Scheme",
+    "Sink",
     "Solver",
     "Sphere",
     "Steady",
+    "Stream",
     "Torus",
     "Transformed",
     "Union",

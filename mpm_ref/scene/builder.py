@@ -28,6 +28,7 @@ from ..shapes import level_set
 from ..shapes.inside import rotation, solid
 from .messages import SceneError, errors_at
 from .records import Keyframes, Oscillation, Ramps, Steady
+from .streams import build_sinks, check_streams, held_regions
 
 NAMES = f'expected "explicit" or one of {", ".join(METHODS)}'
 CFL = 0.5       # share of the stable time step, for a scene that says nothing about its step
@@ -41,6 +42,7 @@ class SceneParts(NamedTuple):
     conditions: Conditions | None
     solver: object              # `hot.methods.Options`; None for the explicit integrator
     contacts: tuple             # of BodyContact between bodies
+    sinks: tuple                # of streams.ParticleSink
     materials: tuple            # of (law, flow) for each body; None where a file holds them
 
 
@@ -48,8 +50,10 @@ def build_parts(scene):
     """Return the `SceneParts` of a scene. Raises SceneError for a part that cannot be built."""
     check_precision(scene)
     materials = tuple(build_material(body, scene.dim, k) for k, body in enumerate(scene.body))
-    return SceneParts(build_clock(scene), build_limits(scene), build_conditions(scene),
-                      build_solver(scene), build_contacts(scene), tuple(
+    clock = build_clock(scene)
+    check_streams(scene, clock)
+    return SceneParts(clock, build_limits(scene), build_conditions(scene),
+                      build_solver(scene), build_contacts(scene), build_sinks(scene), tuple(
                           None if record.material.is_neural else (law, flow)
                           for record, (law, flow, _) in zip(scene.body, materials)))
 
@@ -245,10 +249,13 @@ def build_limits(scene):
 
 
 def build_conditions(scene):
-    """Return colliders, prescribed regions and walls; None if there are none."""
+    """Return colliders, prescribed regions, those of sources last, and walls; None if there are
+    none.
+    """
     colliders = tuple(_collider(c, scene.dim, f"collider[{k}]")
                       for k, c in enumerate(scene.collider))
     prescribed = tuple(_prescribed(f, scene.dim, f"fixed[{k}]") for k, f in enumerate(scene.fixed))
+    prescribed += held_regions(scene)
     walls = _walls(scene.walls, scene.dim)
     if not colliders and not prescribed and walls is None:
         return None

@@ -8,8 +8,10 @@ from ..hot.return_map import check_return_map
 from ..hot.step import check_friction
 from ..problem import Problem
 from ..sampling.arrays import QUANTITIES, check_arrays
+from ..streams import first_bodies
 from .builder import build_bodies
 from .messages import SceneError, errors_at, errors_of
+from .streams import build_sources
 from .toml import canonical
 from .validate import plain, validate_scene
 
@@ -59,12 +61,13 @@ def problem_from_arrays(bodies, dx, **keys):
 
 
 def _problem_of(scene, arrays):
-    (clock, limits, conditions, solver, contacts, _), clip = scene.parts, scene.clip
+    (clock, limits, conditions, solver, contacts, sinks, _), clip = scene.parts, scene.clip
     bodies, strain_bounds = build_bodies(scene, arrays)
+    sources = build_sources(scene, bodies)
     if solver is not None:
         check_implicit_parts(bodies, conditions, solver)
     return Problem(
-        bodies=bodies,
+        bodies=first_bodies(bodies, sources),
         dx=scene.dx,
         clock=clock,
         gravity=np.zeros(scene.dim) if scene.gravity is None else np.array(scene.gravity),
@@ -79,6 +82,8 @@ def _problem_of(scene, arrays):
         solver=solver,
         strain_bounds=strain_bounds,
         contacts=contacts,
+        sources=sources,
+        sinks=sinks,
     )
 
 

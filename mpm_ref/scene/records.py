@@ -32,6 +32,7 @@ from ..shapes.quantities import (
     Vector,
 )
 from .quantity_records import Quantities
+from .stream_records import Sink, Stream, check_source
 
 Name = Annotated[str, Meta(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9_. -]+\Z")]
 Time = Annotated[float, Meta(ge=-1e12, le=1e12)]                        # [s]
@@ -174,7 +175,9 @@ class Arrays(Record):
 
 
 class Body(Record):
-    """Particles of one material: a shape and how to fill it, or arrays from a file."""
+    """Particles of one material: a shape and how to fill it, or arrays from a file; with a source,
+    a stream of blocks of that shape.
+    """
 
     name: Name
     material: Material
@@ -183,6 +186,7 @@ class Body(Record):
     particles: Arrays | None = None
     density: Positive | None = None             # at rest [kg/m^3]
     velocity: Velocity = Velocity()
+    source: Stream | None = None
 
     def __post_init__(self):
         if (self.shape is None) == (self.particles is None):
@@ -191,6 +195,8 @@ class Body(Record):
             raise ValueError("a body with a shape needs `density`")
         if self.particles is not None and self.sampling != Regular():
             raise ValueError("`sampling` is for a body with a shape, not for `particles`")
+        if self.source is not None:
+            check_source(self)
 
 
 class Steady(Kind, tag="steady"):
@@ -369,6 +375,7 @@ class Scene(Record, dict=True):
     solver: Solver | None = None
     collider: tuple[Collider, ...] = ()
     fixed: tuple[Fixed, ...] = ()
+    sink: tuple[Sink, ...] = ()
     walls: Walls | None = None
     boundary: Literal["nodes", "surface"] = "nodes"     # where the conditions of colliders hold
     contact: tuple[BodyContact, ...] = ()           # of bodies with each other

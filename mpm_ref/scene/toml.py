@@ -13,7 +13,7 @@ from .messages import SceneError, joined
 from .validate import validate_scene
 
 FILES = "file", "weights"       # keys that name a file
-MANY = "body", "contact", "collider", "fixed", "quantity"      # lists of tables
+MANY = "body", "contact", "collider", "fixed", "sink", "quantity"      # lists of tables
 LARGEST = 10_000_000            # bytes of a text
 DEEPEST = 50                    # tables and lists within each other
 

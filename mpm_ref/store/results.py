@@ -99,8 +99,14 @@ class Results:
         return frame % n
 
     def count(self, body):
-        """Return the number of particles of a body."""
+        """Return the number of particles of a body, those included that enter or left."""
         return len(self.h5[f"bodies/{body}/m"])
+
+    def present(self, body, frame):
+        """Return which particles of a body (N,) are in the run at a frame: those with a
+        position.
+        """
+        return ~np.isnan(self.field(body, "x", frame)).all(axis=1)
 
     def has(self, body, name):
         """Return whether a field of a body is stored."""
@@ -158,7 +164,8 @@ class Results:
     def _volume_ratio(self, body, frame):
         if self.has(body, "J"):
             return self.field(body, "J", frame)
-        return np.linalg.det(self.field(body, "F", frame))
+        with np.errstate(invalid="ignore"):         # of particles that are not there
+            return np.linalg.det(self.field(body, "F", frame))
 
     def _norm(self, tau):
         """Return |tau|; a fluid stores the isotropic value alone."""

@@ -1,15 +1,16 @@
 """Export results as VTKHDF, the file format of VTK and ParaView, with h5py alone.
 
-Particles become temporal PolyData: one vertex each, the topology stored once for all frames. The
-grid becomes ImageData: nodal density and velocity, computed again from the particles by the PIC
-transfer, in one box of nodes at integer multiples of dx as in the run. Values are in single
-precision, for display; the results file has them in double. 2D lies in the plane z = 0. Format:
-VTKHDF specification, version 2.0 (docs.vtk.org).
+Particles become temporal PolyData: one vertex each, the topology stored once for all frames, or for
+each of them where particles enter and leave. The grid becomes ImageData: nodal density and
+velocity, computed again from the particles by the PIC transfer, in one box of nodes at integer
+multiples of dx as in the run. Values are in single precision, for display; the results file has
+them in double. 2D lies in the plane z = 0. Format: VTKHDF specification, version 2.0
+(docs.vtk.org).
 """
 
 import numpy as np
 
-from ..body import Body, particles_at
+from ..body import Body, filled, particles_at
 from ..core.grid import Storage
 from ..explicit import Scheme, scatter
 from ..materials import NoFlow
@@ -30,20 +31,27 @@ def export_particles(results, out):
     """
     results.index(0)            # there must be a frame
     names = [name for name, (scalar, _) in VALUES.items() if results.offers(scalar)]
-    count, frames = sum(map(results.count, results.bodies)), len(results)
-    require_space(out, 4 * count * (frames * (3 + sum(VALUES[name][1] for name in names)) + 5))
+    there = [_gather(results, lambda body, k=k: results.present(body, k))
+             for k in range(len(results))]
+    starts = np.cumsum([0, *(mask.sum() for mask in there)])
+    rows = int(starts[-1])
+    require_space(out, 4 * rows * (8 + sum(VALUES[name][1] for name in names)))
     with replacing(out) as part, new_hdf5(part) as h5:
         root = create_root(h5, "PolyData")
-        _topology(root, count)
-        points = root.create_dataset("Points", (frames * count, 3), "f4")
-        data = {name: _values(root, name, frames * count) for name in names}
-        for k in range(frames):
-            rows = slice(k * count, (k + 1) * count)
-            points[rows] = _gather(results, lambda body, k=k: three(results.field(body, "x", k)))
+        one = all(mask.all() for mask in there)
+        _topology(root, np.diff(starts)[:1] if one else np.diff(starts))
+        points = root.create_dataset("Points", (rows, 3), "f4")
+        data = {name: _values(root, name, rows) for name in names}
+        for k, mask in enumerate(there):
+            at = slice(starts[k], starts[k + 1])
+            x = _gather(results, lambda body, k=k: three(results.field(body, "x", k)))
+            points[at] = x[mask]
             for name, dataset in data.items():
-                dataset[rows] = _gather(results, lambda body, k=k, name=name:
-                                        _value(results, body, name, k))
-        _steps(root, results.time, count, names)
+                dataset[at] = _gather(results, lambda body, k=k, name=name:
+                                      _value(results, body, name, k))[mask]
+        _steps(root, results.time, starts[:-1], names)
+        if not one:
+            _put_parts(root["Steps"], starts[:-1])
 
 
 def _value(results, body, name, frame):
@@ -70,15 +78,24 @@ def create_root(h5, kind):
     return root
 
 
-def _topology(root, count):
-    """Write the topology: one vertex per particle, no other cells."""
-    root["NumberOfPoints"] = np.array([count], dtype="i8")
+def _topology(root, counts):
+    """Write the topology of parts with these numbers of particles: one vertex per particle, no
+    other cells.
+    """
+    root["NumberOfPoints"] = counts.astype("i8")
     for name in TOPOLOGIES:
-        n = count if name == "Vertices" else 0
+        n = counts if name == "Vertices" else 0 * counts
         group = root.create_group(name)
-        group["NumberOfCells"] = group["NumberOfConnectivityIds"] = np.array([n], dtype="i8")
-        group["Offsets"] = np.arange(n + 1, dtype="i8")
-        group["Connectivity"] = np.arange(n, dtype="i8")
+        group["NumberOfCells"] = group["NumberOfConnectivityIds"] = n.astype("i8")
+        group["Offsets"] = np.concatenate([np.arange(c + 1, dtype="i8") for c in n])
+        group["Connectivity"] = np.concatenate([np.arange(c, dtype="i8") for c in n])
+
+
+def _put_parts(steps, starts):
+    """Let each frame have a part of its own, whose particles begin at `starts` (T,)."""
+    steps["PartOffsets"][:] = np.arange(len(starts))
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        steps[name][:, TOPOLOGIES.index("Vertices")] = starts
 
 
 def _values(root, name, rows):
@@ -87,13 +104,12 @@ def _values(root, name, rows):
     return root.require_group("PointData").create_dataset(name, shape, kind)
 
 
-def _steps(root, time, count, names):
+def _steps(root, time, starts, names):
     """Write the times and the offset of each frame; the topology starts at 0 for all."""
     n = len(time)
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = n
     steps["Values"] = np.asarray(time, dtype=float)
-    starts = np.arange(n, dtype="i8") * count
     steps["PartOffsets"] = np.zeros(n, dtype="i8")
     steps["NumberOfParts"] = np.ones(n, dtype="i8")
     steps["PointOffsets"] = starts
@@ -120,6 +136,8 @@ def export_grid(results, out):
         velocity = root.create_dataset("PointData/velocity", (*images, 3), "f4")
         for k in range(len(results)):
             grid = _grid(results, k, scheme)
+            if grid is None:            # no particle is there: the images stay 0
+                continue
             at = (k, *_within(grid, first))
             density[at] = _image(grid.m, results.dim) / results.dx**results.dim
             velocity[at] = _image(three(_velocity(grid)), results.dim)
@@ -127,20 +145,24 @@ def export_grid(results, out):
 
 
 def _grid(results, frame, scheme):
-    bodies = [_body(results, name, frame) for name in results.bodies]
+    bodies = filled(_body(results, name, frame) for name in results.bodies)
+    if not bodies:
+        return None
     return scatter(bodies, Storage(results.dx, scheme.stencil, results.dim), scheme, 0.0)
 
 
 def _body(results, name, frame):
-    x, v = results.field(name, "x", frame), results.field(name, "v", frame)
-    m, V0 = results.field(name, "m"), results.field(name, "V0")
+    there = results.present(name, frame)
+    x, v = (results.field(name, field, frame)[there] for field in ("x", "v"))
+    m, V0 = (results.field(name, field)[there] for field in ("m", "V0"))
     return Body(name, particles_at(x, v, m, V0, "pic"), None, NoFlow(), np.arange(len(x)))
 
 
 def _box(results, scheme):
     """Return the index of the first node and the shape of the box that covers all frames."""
-    ends = [(x.min(axis=0), x.max(axis=0)) for body in results.bodies
-            for x in (results.field(body, "x", k) for k in range(len(results)))]
+    found = [results.field(body, "x", k)[results.present(body, k)]
+             for body in results.bodies for k in range(len(results))]
+    ends = [(x.min(axis=0), x.max(axis=0)) for x in found if len(x)]
     corners = np.array([np.min(ends, axis=(0, 1)), np.max(ends, axis=(0, 1))])
     grid = Storage(results.dx, scheme.stencil, results.dim).cover([corners])
     return grid.origin.copy(), grid.m.shape

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from ..body import restore_order
+from ..streams import total_bodies
 from .atomic import part_of, require_space
 from .checksums import HEAD
 from .journal import LIBVER, InUse, JournaledFile, in_use
@@ -132,7 +133,7 @@ class Writer:
             (*CLOCK, "energy"), (frame.t, frame.dt, frame.state.step, energy), strict=True)]
         for body in frame.state.bodies:
             group = self.h5[f"bodies/{body.name}"]
-            rows += [(group[name], restore_order(a, body.id))
+            rows += [(group[name], restore_order(a, body.id, len(group["m"])))
                      for name, a in carried(body).items() if name in group]
         require_space(self.path, sum(np.asarray(row).nbytes for _, row in rows))
         for dataset, row in rows:
@@ -195,7 +196,7 @@ def _lay_out(h5, problem, fields):
     for name, (kind, unit) in CLOCK.items():
         _series(h5, name, (), kind, 0).attrs["unit"] = unit
     _series(h5, "energy", (len(ENERGIES),), "f8", 0).attrs.update(unit="J", columns=list(ENERGIES))
-    for k, body in enumerate(problem.bodies):
+    for k, body in enumerate(total_bodies(problem)):
         group = h5.create_group(f"bodies/{body.name}")
         group.attrs.update(index=k, law=_json_text(body.law), flow=_json_text(body.flow))
         for name, unit in (("m", "kg"), ("V0", f"m^{problem.dim}")):

@@ -79,8 +79,13 @@ def scene_at(scene, chosen, others=None):
 def in_seconds(scene):
     """Return the tables of a scene whose end and frames are times, not counts of steps.
 
-    Raises SceneError for a number of steps without a time step.
+    Raises SceneError for a number of steps without a time step, and for sources and sinks, with
+    which runs have no material points in common.
     """
+    if scene.sink or any(body.source is not None for body in scene.body):
+        raise SceneError("sources or sinks: runs are compared by material points that are there "
+                         "from the start to the end; expected a scene without [body.source] and "
+                         "[[sink]]")
     tables = {key: value for key, value in plain(scene).items() if value is not None}
     dt = tables.get("dt")
     if "steps" in tables and dt is None:

@@ -39,7 +39,7 @@ FLOORS = (
     ("materials.learned",),
     ("explicit", "energy"),
     ("timestep", "monitor", "adjoint", "constitutive", "energy_budget", "body_contact"),
-    ("tape",),
+    ("tape", "streams"),
     ("hot", "rom", "nclaw"),
     ("problem", "shapes", "attempt"),
     ("simulate", "sampling", "preflight"),

@@ -46,7 +46,8 @@ class FullModel(NamedTuple):
 def ldm_full_model(scene):
     """Return the `FullModel` of a scene that LDM reduces. Raises ValueError for features that its
     reduced runs do not have: more bodies, plastic flow, an affine transfer, averaged volumes or
-    splines, conditions at surfaces, a velocity at the start, forces of single particles, a box.
+    splines, sources or sinks, conditions at surfaces, a velocity at the start, forces of single
+    particles, a box.
     """
     problem = build(scene)
     body = problem.bodies[0]
@@ -56,6 +57,7 @@ def ldm_full_model(scene):
                    "averaged volumes (f_bar)": problem.scheme.f_bar,
                    "single precision": problem.scheme.precision != "double",
                    "averaged splines (gimp)": problem.scheme.gimp > 0.0,
+                   "sources or sinks": problem.sources or problem.sinks,
                    'boundary = "surface"': isinstance(problem.conditions, SurfaceConditions),
                    "a start that moves": np.any(body.particles.v),
                    "forces of single particles": body.particles.b.ndim > 1,
@@ -71,8 +73,8 @@ def ldm_full_model(scene):
 def nsf_full_model(scene):
     """Return the `FullModel` of a scene that NSF reduces. Raises ValueError for features that its
     reduced runs do not have: an implicit integrator, a transfer other than apic, its damping,
-    relaxation and added mass, averaged volumes, conditions at surfaces, contact of bodies, a fluid,
-    forces of single particles, a box that clips.
+    relaxation and added mass, averaged volumes, conditions at surfaces, contact of bodies, sources
+    or sinks, a fluid, forces of single particles, a box that clips.
     """
     problem = build(scene)
     particles = [body.particles for body in problem.bodies]
@@ -88,6 +90,7 @@ def nsf_full_model(scene):
         (isinstance(problem.conditions, SurfaceConditions), 'boundary = "surface"',
          'boundary = "nodes"'),
         (bool(problem.contacts), "contact of bodies", "one velocity field"),
+        (bool(problem.sources or problem.sinks), "sources or sinks", "the same particles always"),
         (any(p.F.ndim == 1 for p in particles), "a fluid", "solids, which have a shear stress"),
         (any(p.b.ndim > 1 for p in particles), "forces of single particles", "gravity alone"),
         (problem.clip is not None, "a box that clips", "none"))
