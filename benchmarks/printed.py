@@ -6,6 +6,7 @@ steps, bit for bit, as long as the first one lasts.
 
 import resource
 import time
+from math import inf
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -25,10 +26,10 @@ def costs(names, threads, seconds, method):
     """
     rows = []
     for name in names:
-        steps = 10**9
+        steps, limit = 10**9, seconds
         for n in threads:
-            row = in_own_process(name, n, seconds, method, steps)
-            steps = min(steps, row["steps"])
+            row = in_own_process(name, n, limit, method, steps)
+            steps, limit = row["steps"], inf
             rows.append(row)
     return rows
 
