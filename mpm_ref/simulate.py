@@ -108,14 +108,17 @@ def advance(problem, stepper, state):
     dt = length_of_step(problem, stepper, state)
     if bodies:
         dt = take_step(problem, stepper, state, dt)
+    else:
+        state.solve = None
     state.step += 1
     state.t = state.step * problem.clock.dt if problem.clock.dt else state.t + dt
+    if runs_away(problem, state, dt):       # before a sink could hide it
+        check(problem, state, dt)
     if problem.sinks:
         take_out(problem, state)
     if problem.sources and let_in(problem, state, before):
         update_bound(problem, stepper, state)
-    due = state.step % CHECK == 0 or ended(problem.clock, state)
-    if due or runs_away(problem, state, dt):
+    if state.step % CHECK == 0 or ended(problem.clock, state):
         check(problem, state, dt)
     return dt
 

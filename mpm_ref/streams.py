@@ -178,10 +178,13 @@ def let_in(problem, state, before):
 
 
 def _enter_account(problem, state, body, sign):
-    """Add (sign = 1) or subtract the energy of a body that enters or leaves."""
+    """Add (sign = 1) or subtract the energy of a body that enters or leaves. What leaves may have
+    gained energy within the limits, which the account of the others then allows.
+    """
     if state.account is not None:
         change = energy((body,), problem.gravity, problem.inertia)
-        noise = noise_of(problem, (body,)) if sign > 0.0 else 0.0
+        noise = noise_of(problem, (body,)) if sign > 0.0 else (
+            problem.limits.growth * (change.kinetic + change.elastic))
         state.account = state.account.changed(change, sign, noise)
 
 

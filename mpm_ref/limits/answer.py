@@ -10,7 +10,7 @@ from ..store.text import counted
 from ..sweep.observation import REFUSED, STOPPED
 from .axes import AXIS, LEAST_NU, MOST_LONGER, UP
 from .cause import RESOLUTION, SETTING, VANISHING, limit_counts
-from .cell import cell_of, cell_text
+from .cell import FINE, cell_of, cell_text
 from .search import NARROW
 from .verdict import AT_COARSE, LOST, RIGHT, SLACK, UNCHECKED, WRONG
 
@@ -40,7 +40,7 @@ def answer_of(search, scene, name):
         "end": scene.end, "error": judge.error, "quantities": list(judge.quantities),
         "tolerance": dict(judge.tolerance), "slack": SLACK, "most_longer": MOST_LONGER,
         "narrow": NARROW, "size": scenes.size, "base": {"outcome": base.outcome, **vars(base.cost)},
-        "warnings": list(base.warnings),
+        "warnings": [*base.warnings, *warnings_of_reference(judge)],
         "wrong": wrong, "limits": limit_counts(wrong),
         "nearest": nearest(directions), "directions": directions, "left_out": search.left_out,
         "maps": [map_facts(one) for one in search.maps],
@@ -48,6 +48,14 @@ def answer_of(search, scene, name):
         "cpu": judge.cpu, "missing_cpu": search.remaining() * judge.cpu / len(judge.verdicts),
         "complete": search.remaining() == 0,
     }
+
+
+def warnings_of_reference(judge):
+    """Return the sentence on a body that the scene as given tears at dx/2 alone, if any."""
+    fine = judge.base.get(FINE)
+    if fine is None or not fine.tear or judge.base[1.0].tear:
+        return []
+    return [f"at dx/2, which the others are compared with: {fine.tear}"]
 
 
 def distance(cell):

@@ -177,7 +177,7 @@ class RemovalStudy:
 
     def verdict_of_failure(self, observation):
         """Return the verdict of a run that did not reach its end, or tore a body."""
-        if observation.outcome == UNSTABLE or observation.tear:
+        if observation.outcome == UNSTABLE or (observation.finished and observation.tear):
             return REQUIRED
         if observation.outcome in (REFUSED, CRASHED):
             return IMPOSSIBLE

@@ -83,11 +83,22 @@ def held_regions(scene):
             raise SceneError(f"body[{k}].source.hold = true: expected an analytic shape, whose "
                              "nodes it holds, or hold = false")
         with errors_at(f"body[{k}].source"):
-            v, length, stop = stream_of(record)
-            until = stop + length / float(np.linalg.norm(v))
+            until, (v, *_) = time_of_leaving(record), stream_of(record)
             regions.append(Prescribed(level_set(record.shape), Motion(Steady(v)), follows=False,
                                       since=record.source.start, until=until))
     return tuple(regions)
+
+
+def time_of_leaving(record):
+    """Return the time [s] at which the last block of a body's record has left its shape; infinite
+    without `stop`.
+    """
+    v, length, stop = stream_of(record)
+    if stop == inf:
+        return inf
+    speed, start = float(np.linalg.norm(v)), record.source.start
+    blocks = blocks_until((start, length / speed), stop, inf)
+    return start + ((blocks - 1) * length + length_along(solid(record.shape), v)) / speed
 
 
 def length_along(shape, v):

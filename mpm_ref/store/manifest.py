@@ -48,6 +48,9 @@ def scene_hash(problem):
         [(body.name, len(body.id), *map(_in_full, (body.law, body.flow)))
          for body in problem.bodies],
         problem.dx, problem.clock, list(map(float, problem.gravity)), problem.scheme, problem.clip,
+        *[(one.body, one.velocity.tolist(), one.length, one.start, one.blocks)
+          for one in problem.sources],
+        *[_in_full(one.shape) for one in problem.sinks],
     ))
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -140,7 +140,7 @@ def test_a_source_holds_its_nodes_as_a_fixed_region_does():
 [[fixed]]
 region = { type = "box", lower = [0.5, 0.9], upper = [0.6, 1.0] }
 follows = false
-until = 0.3
+until = 0.2
 motion = { translation = { type = "steady", rate = [0.0, -1.0] } }
 """
     held = problem(2, "stop = 0.2", "end = 0.3\n" + gravity()).conditions

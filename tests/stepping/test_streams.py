@@ -108,7 +108,9 @@ def test_a_source_stops_and_lets_go():
     """Blocks enter before `stop`; the nodes are held until the last one has passed."""
     one = problem(2, "stop = 0.2", "end = 0.5\n" + gravity())
     (held,) = one.conditions.prescribed
-    assert (held.since, held.until) == (0.0, pytest.approx(0.3))
+    assert (held.since, held.until) == (0.0, pytest.approx(0.2))
+    (later,) = problem(2, "stop = 0.29", "end = 0.5\n" + gravity()).conditions.prescribed
+    assert later.until == pytest.approx(0.3)        # the third block enters at 0.2 s
     assert one.sources[0].blocks == 2
     _, state = run(one)
     assert len(state.bodies[0].id) == 32
@@ -147,6 +149,24 @@ def test_an_empty_run_waits_for_its_source():
         assert state.t == pytest.approx(0.35, abs=0.0043)
         y = state.bodies[0].particles.x[:, 1].max()
         assert y == pytest.approx(TOP - 0.5 * SPACING - SPEED * (state.t - 0.2), abs=1e-6)
+
+
+def test_a_run_whose_particles_have_all_left_takes_its_steps():
+    one = problem(2, FREE + ", stop = 0.05", "steps = 300\nlongest = 0.01", sink())
+    _, state = run(one)
+    assert (state.step, len(state.bodies[0].id)) == (300, 0)
+    one = problem(2, FREE + ", stop = 0.05", "steps = 300", sink(height=0.99))
+    assert run(one)[1].step == 300
+
+
+def test_a_sink_hides_no_particle_that_runs_away():
+    one = problem(2, FREE, "dt = 0.004\nend = 0.3\n" + gravity(), sink())
+
+    def throw(state, dt):
+        state.bodies[0].particles.v[:, 1] = -40.0
+
+    with pytest.raises(Unstable):
+        list(simulate(one, on_step=throw))
 
 
 def test_energy_is_accounted_for():
