@@ -96,13 +96,22 @@ def save(out, rows, threads, repeats):
     """Write the rows with the conditions of the measurement."""
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps({
-        "command": "python -m benchmarks " + " ".join(sys.argv[1:]),
+        "command": "python -m benchmarks " + " ".join(without_out(sys.argv[1:])),
         "commit": commit(Path(__file__).parents[1]),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": platform.machine(), "cpu": cpu_model(), "cores": os.cpu_count(),
         "threads": threads, "repeats": repeats, "rows": rows,
     }, indent=1) + "\n")
     typer.echo(f"wrote {out}")
+
+
+def without_out(arguments):
+    """Return the arguments of a command without its output file, a path of one machine."""
+    kept = list(arguments)
+    while "--out" in kept:
+        k = kept.index("--out")
+        del kept[k:k + 2]
+    return [one for one in kept if not one.startswith("--out=")]
 
 
 @app.command()

@@ -13,7 +13,7 @@ from .attempt import take_step
 from .body import filled
 from .core.grid import OutOfRange
 from .monitor import CHECK, Account, account, check, lost, runs_away
-from .streams import entry_speed, let_in, next_entry, take_out
+from .streams import let_in, next_entry, take_out
 from .timestep import TimeStep, TooLarge, advective, refuse, stable_dt
 
 SORT = 64        # steps between physical sorts of the particles by cell
@@ -97,8 +97,8 @@ def show(state, dt):
 
 
 def advance(problem, stepper, state):
-    """Make one step: sort now and then, choose dt, step, clip, check. Return dt; of an implicit
-    step in parts (see `attempt`), the length of the last part.
+    """Make one step: sort now and then, choose dt, step, clip, check, then let particles leave and
+    enter. Return dt; of an implicit step in parts (see `attempt`), the length of the last part.
     """
     before, bodies = state.t, filled(state.bodies)
     if state.step % SORT == 0 and bodies:
@@ -112,14 +112,13 @@ def advance(problem, stepper, state):
         state.solve = None
     state.step += 1
     state.t = state.step * problem.clock.dt if problem.clock.dt else state.t + dt
-    if runs_away(problem, state, dt):       # before a sink could hide it
+    due = state.step % CHECK == 0 or ended(problem.clock, state)
+    if due or runs_away(problem, state, dt):
         check(problem, state, dt)
     if problem.sinks:
         take_out(problem, state)
     if problem.sources and let_in(problem, state, before):
         update_bound(problem, stepper, state)
-    if state.step % CHECK == 0 or ended(problem.clock, state):
-        check(problem, state, dt)
     return dt
 
 
@@ -161,8 +160,6 @@ def swiftest(problem, stepper, state):
     bodies = filled(state.bodies)
     bound = min((advective(body.particles, problem.dx, 0.0, problem.gravity) for body in bodies),
                 default=inf)
-    entering = entry_speed(problem.sources, state.t)
-    bound = min(bound, problem.dx / entering) if entering > 0.0 else bound
     if not (stepper.implicit and bodies):
         return bound
     u = stepper.driven_speed(bodies, state.t, AHEAD * min(next_dt(clock, state, bound), 1.0))

@@ -144,12 +144,6 @@ def next_entry(sources, t):
     return min((source.time(source.due(t)) for source in sources), default=inf)
 
 
-def entry_speed(sources, t):
-    """Return the largest speed of blocks that will enter after time t [s]; 0 without one."""
-    coming = (source.speed for source in sources if source.due(t) < source.blocks)
-    return max(coming, default=0.0)
-
-
 def take_out(problem, state):
     """Remove the particles that are in a sink from the bodies of a state."""
     bodies = list(state.bodies)

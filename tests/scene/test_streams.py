@@ -1,7 +1,9 @@
 """The tables [body.source] and [[sink]]: particles that enter and leave."""
 
+import admissible_toys
 import numpy as np
 import pytest
+from small_laws import saved
 from stream_scenes import LENGTH, SPEED, gravity, problem, sink, stream
 
 from mpm_ref.core.levelset import half_space
@@ -88,8 +90,6 @@ PARTICLES = '{ file = "x.npz" }'
     ("linear = [0.0, -1.0]", "linear = [0.0, -1.0], angular = 1.0", "`velocity.angular` is for"),
     ('{ type = "box", lower = [0.5, 0.9], upper = [0.6, 1.0] }', UNION,
      "source.hold = true: expected an analytic shape"),
-    ('{ law = "fixed_corotated", E = 1e4, nu = 0.3 }', '{ law = "neural", weights = "w.npz" }',
-     "w.npz"),
     ("\nshape = ", f"\nparticles = {PARTICLES}\n#", "`source` is for a body with a shape"),
     ("source = {  }", '[[sink]]\nname = "no shape"', "sink[0].shape: this key is missing"),
     ("source = {  }", "source = { length = 1e-9 }", "particles in all"),
@@ -98,6 +98,22 @@ def test_what_makes_no_stream_is_refused(old, new, message):
     assert old in stream()
     with pytest.raises(SceneError) as fault:
         build(loads(stream().replace(old, new, 1)))
+    assert message in str(fault.value)
+
+
+@pytest.mark.parametrize(("source", "message"), [
+    (True, "`source` with the law 'neural': expected a law by its name"),
+    (False, "expected a law by its name with sources or sinks")])
+def test_a_learned_law_refuses_streams(tmp_path, source, message):
+    file = saved(tmp_path, admissible_toys.laws())
+    law = f'{{ law = "neural", weights = "{file}" }}'
+    text = stream(3, more="" if source else sink(3)).replace(
+        '{ law = "fixed_corotated", E = 1e4, nu = 0.3 }', law)
+    text = text if source else text.replace("source = {  }\n", "")
+    assert law in text
+    assert ("source" in text) == source
+    with pytest.raises(SceneError) as fault:
+        loads(text)
     assert message in str(fault.value)
 
 
