@@ -197,10 +197,10 @@ def test_the_monitor_still_ends_a_run_that_gains_energy():
 
 
 def test_steps_shorten_when_a_fast_block_has_entered():
-    """A fast source enters a scene at rest whose steps are long."""
+    """A fast source enters a slow scene whose steps are long."""
     text = ('\n[[body]]\nname = "rest"\ndensity = 1000.0\nshape = { type = "box", lower = '
             '[0.5, 0.1], upper = [0.6, 0.2] }\nmaterial = { law = "fixed_corotated", E = 1e4, '
-            'nu = 0.3 }\n')
+            'nu = 0.3 }\nvelocity = { linear = [0.001, 0.0] }\n')
     one = problem(2, FREE + ", start = 0.2, stop = 0.21",
                   'integrator = "hot"\nlongest = 0.1\nend = 0.3\nlimits = { cfl = 0.6 }', text)
     seen, state = run(one)
@@ -209,6 +209,7 @@ def test_steps_shorten_when_a_fast_block_has_entered():
     later = times[:-1] > 0.2 * (1.0 - 1e-9)
     assert np.diff(times)[~later].max() > 0.09
     assert np.diff(times)[later].max() <= 0.5 * DX / SPEED * (1.0 + 1e-9)
+    assert state.rejected == 0
 
 
 @pytest.mark.parametrize("clock", ["explicit", "implicit"])
