@@ -26,7 +26,7 @@ class SceneStates(NamedTuple):
 
     times: np.ndarray       # (shots,) [s]
     body: np.ndarray        # (N,) number of each particle's body
-    x: np.ndarray           # (shots, N, 3) [m]
+    x: np.ndarray           # (shots, N, 3) [m]; NaN where a particle has not entered
     stress: np.ndarray | None = None    # (shots, N) Frobenius norm of the Kirchhoff stress [Pa],
                                         # of the scenes whose pictures show it
 
@@ -103,7 +103,7 @@ def colouring(history, view):
         return (lambda k: palette[history.body]), None
     field, factor, _ = view.scalar
     values = factor * getattr(history, field)
-    top = np.quantile(values[shown_shots(history, view)], 0.95)
+    top = np.nanquantile(values[shown_shots(history, view)], 0.95)
     scale = plt.cm.ScalarMappable(Normalize(0.0, top), open_above(view.colours[0]))
     return (lambda k: scale.to_rgba(values[k])[:, :3]), scale
 
@@ -118,8 +118,8 @@ def open_above(colours):
 def view_box(history, view):
     """Return the corners (2, 3) of the box to show: all particles, and what the view asks for."""
     x = history.x[shown_shots(history, view)].reshape(-1, 3)
-    spare = 0.04 * np.ptp(x, axis=0).max()
-    low, high = x.min(axis=0) - spare, x.max(axis=0) + spare
+    spare = 0.04 * (np.nanmax(x, axis=0) - np.nanmin(x, axis=0)).max()
+    low, high = np.nanmin(x, axis=0) - spare, np.nanmax(x, axis=0) + spare
     return np.stack([low if view.low is None else np.minimum(low, view.low),
                      high if view.high is None else np.maximum(high, view.high)])
 
@@ -136,7 +136,7 @@ def fitted_camera(layers, view):
 def scene_layers(history, k, conditions, view, colour_of):
     """Return the balls of particles and colliders, and those of the prescribed regions."""
     box = view_box(history, view)
-    solid = [cloud(history.x[k].astype(float), history.body, colour_of(k), spacing(history.x[0]))]
+    solid = [scene_cloud(history, k, colour_of(k))]
     where = float(history.times[k]), box, np.ptp(box, axis=0).max() / FINENESS
     prescribed = [Balls(*(np.zeros((0, *a.shape[1:])) for a in solid[0]))]
     if conditions is not None:
@@ -149,6 +149,13 @@ def scene_layers(history, k, conditions, view, colour_of):
 def join_balls(parts):
     """Return all balls of several sets as one."""
     return Balls(*(np.concatenate(a) for a in zip(*parts, strict=True)))
+
+
+def scene_cloud(history, k, colour):
+    """Return the balls of the particles that are there at shot k, of colours (N, 3)."""
+    there, first = (np.isfinite(x).all(axis=1) for x in (history.x[k], history.x[0]))
+    return cloud(history.x[k, there].astype(float), history.body[there], colour[there],
+                 spacing(history.x[0, first]))
 
 
 def spacing(x):

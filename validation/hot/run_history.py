@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mpm_ref.body import select_rows
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.energy import energy, momentum
 from mpm_ref.hot.step import ImplicitStepper
@@ -18,6 +19,7 @@ from mpm_ref.scene import build
 from mpm_ref.scene.toml import digest
 from mpm_ref.simulate import State, advance, check, ended, frame_is_due, show
 from mpm_ref.store.manifest import source_hash
+from mpm_ref.streams import first_bodies, total_bodies
 from mpm_ref.timestep import TooLarge
 
 from ..common.provenance import commit
@@ -35,12 +37,13 @@ class RunHistory(NamedTuple):
     steps: np.ndarray       # (steps, len(COLUMNS)); support: force of all conditions [N]; gap: of
                             # the momentum's balance, relative to the momenta in it
     times: np.ndarray       # (shots,)
-    body: np.ndarray        # (N,) number of each particle's body
-    x: np.ndarray           # (shots, N, 3) [m], single precision as the next two
+    body: np.ndarray        # (N,) number of each particle's body, of all that enter too
+    x: np.ndarray           # (shots, N, 3) [m], single precision as the next two; NaN until a
+                            # particle has entered
     speed: np.ndarray       # (shots, N) [m/s]
     stress: np.ndarray      # (shots, N) Frobenius norm of the Kirchhoff stress [Pa]
-    facts: dict             # scene and source (hashes), patience, end, why it ended, mass, commit,
-                            # rejected steps
+    facts: dict             # scene and source (hashes), patience, end, why it ended, mass [kg]
+                            # at the start and the end, commit, rejected steps
 
     def column(self, name):
         """Return one entry of `COLUMNS` at every step."""
@@ -79,7 +82,8 @@ def run(scene, patience):
     problem = build(scene)
     stepper = ImpulseStepper(problem.scheme, problem.dx, problem.dim, problem.gravity,
                              problem.conditions, problem.solver)
-    state, log = State(problem.bodies), Log(problem, stepper)
+    state = State(first_bodies(problem.bodies, problem.sources))
+    log = Log(problem, stepper, state)
     stepper.start(state.bodies)
     check(problem, state, 0.0)
     log.shot(show(state, 0.0))
@@ -96,25 +100,40 @@ def step_to_end(problem, stepper, state, log, patience):
     while not ended(problem.clock, state):
         if process_time() - start > patience:
             return f"more than {patience} CPU seconds"
-        before, since = momentum(state.bodies), process_time()
+        before, since = state.bodies, process_time()
+        start_of_step = StepStart([len(b.id) for b in before], momentum(before), mass(before))
         dt = advance(problem, stepper, state)
-        log.step(state, dt, before, process_time() - since)
+        log.step(state, dt, start_of_step, process_time() - since)
         if frame_is_due(problem.clock, state):
             log.shot(show(state, dt))
     return "end"
 
 
+class StepStart(NamedTuple):
+    """Particles, momentum and mass before a step."""
+
+    counts: list            # particles of each body
+    momentum: np.ndarray    # (3,) [kg m/s]
+    mass: float             # [kg]
+
+
+def mass(bodies):
+    """Return the mass of all particles [kg]."""
+    return sum(float(b.particles.m.sum()) for b in bodies)
+
+
 class Log:
     """The rows and pictures of a run, collected step by step."""
 
-    def __init__(self, problem, stepper):
+    def __init__(self, problem, stepper, state):
         self.problem, self.stepper, self.rows, self.shots = problem, stepper, [], []
-        self.mass = sum(float(b.particles.m.sum()) for b in problem.bodies)
+        self.mass = mass(state.bodies)
+        self.counts = [len(b.id) for b in total_bodies(problem)]
         frames = round(problem.clock.end / problem.clock.interval)
         self.due = {round(frames * k / SHOTS) for k in range(SHOTS + 1)}
 
     def step(self, state, dt, before, cpu):
-        """Add the row of a step that led from the momentum `before` to a state."""
+        """Add the row of a step that led from the `StepStart` before to a state."""
         report, q = state.solve, energy(state.bodies, self.problem.gravity, self.problem.inertia)
         self.rows.append((
             state.step, state.t, dt, report.iterations, report.coarse_iterations,
@@ -125,40 +144,52 @@ class Log:
     def gap(self, state, dt, before):
         """Return the gap of the momentum's balance, relative to the momenta in it.
 
-        It is |P - P_before - dt M g - impulse|; the momenta are those of all particles, of gravity
-        and of the conditions.
+        It is |P - P_before - dt M g - impulse|; the momenta are those of all particles that the
+        step started with, of gravity and of the conditions.
         """
-        fall, push = dt * self.mass * self.problem.gravity, self.stepper.impulse
-        left = momentum(state.bodies) - before - fall - push
+        bodies = [select_rows(b, b.id < n) for b, n in zip(state.bodies, before.counts,
+                                                           strict=True)]
+        fall, push = dt * before.mass * self.problem.gravity, self.stepper.impulse
+        left = momentum(bodies) - before.momentum - fall - push
         size = sum(float(b.particles.m @ np.linalg.norm(b.particles.v, axis=1))
-                   for b in state.bodies) + np.linalg.norm(fall) + np.linalg.norm(push)
+                   for b in bodies) + np.linalg.norm(fall) + np.linalg.norm(push)
         return np.linalg.norm(left) / size if size else 0.0
 
     def shot(self, frame):
         """Add a picture of a frame that is due."""
         if frame.index in self.due:
-            self.shots.append((frame.t, picture(frame.state.bodies)))
+            self.shots.append((frame.t, picture(frame.state.bodies, self.counts)))
 
     def history(self, state, why):
         """Return the `RunHistory`, with a last picture where the run broke off."""
         if state.t > self.shots[-1][0]:
-            self.shots.append((state.t, picture(state.bodies)))
+            self.shots.append((state.t, picture(state.bodies, self.counts)))
         times, pictures = zip(*self.shots, strict=True)
-        body = np.concatenate([np.full(len(b.id), k, np.uint8) for k, b in enumerate(state.bodies)])
+        body = np.repeat(np.arange(len(self.counts), dtype=np.uint8), self.counts)
         facts = {"why": why, "end": self.problem.clock.end, "dx": self.problem.dx,
                  "rejected": state.rejected,
-                 "mass": [self.mass, sum(float(b.particles.m.sum()) for b in state.bodies)]}
+                 "mass": [self.mass, mass(state.bodies)]}
         return RunHistory(np.array(self.rows, dtype=float).reshape(-1, len(COLUMNS)),
                       np.array(times), body, *map(np.stack, zip(*pictures, strict=True)), facts)
 
 
-def picture(bodies):
-    """Return x, speed and stress (see `RunHistory`), body by body in the order of their numbers."""
+def picture(bodies, counts):
+    """Return x, speed and stress (see `RunHistory`) of particles in the order of their bodies and
+    numbers, NaN for those that are not there; counts: particles of each body in the whole run.
+    """
+    places = np.concatenate([first + b.id for first, b in zip(np.cumsum([0, *counts[:-1]]), bodies,
+                                                              strict=True)])
     rows = [(q.x, np.linalg.norm(q.v, axis=1), np.linalg.norm(q.tau.reshape(len(q.x), -1), axis=1))
             for q in (body.particles for body in bodies)]
-    orders = [np.argsort(body.id) for body in bodies]
-    return tuple(np.concatenate([a[order] for a, order in zip(part, orders, strict=True)])
-                 .astype(np.float32) for part in zip(*rows, strict=True))
+    return tuple(scatter(np.concatenate(part), places, sum(counts))
+                 for part in zip(*rows, strict=True))
+
+
+def scatter(a, places, count):
+    """Return `count` rows in single precision: those of a in their places, NaN elsewhere."""
+    rows = np.full((count, *a.shape[1:]), np.nan, dtype=np.float32)
+    rows[places] = a
+    return rows
 
 
 def unpublished(folder):

@@ -1,9 +1,8 @@
 """Settings that HOT prints, as the scenes and the methods here carry them.
 
 The spacings and numbers of particles of Table 2 are those of the scenes at the paper's size (see
-`sizes`). The soft tissue of the wheel, which even the release leaves out, is not compared, nor is
-the sauce's number of particles, which a source pours. Of the materials of Table 1, scenes name
-metal alone.
+`sizes`). The soft tissue of the wheel, which even the release leaves out, is not compared. Of the
+materials of Table 1, scenes name metal alone.
 """
 
 from math import log10
@@ -22,7 +21,7 @@ from ..common import targets
 from ..common.registry import experiment
 from ..common.scenes import SCENES, record_settings
 from . import stiffness, stretched_box, warm_states
-from .sizes import sized
+from .sizes import entered, sized
 
 PARTS = {       # the bodies that are parts 0, 1, .. of Table 2
     "twist": ("pillars", "balls"),
@@ -36,7 +35,7 @@ PARTS = {       # the bodies that are parts 0, 1, .. of Table 2
 }
 METALS = {"boxes": ("metal",), "donut": ("left bar", "right bar"), "wheel": ("wheel",),
           "aluminium": ("aluminium",)}
-POURED = ("grains", "sauce")        # by a source in the paper: a column of another number here
+UNCOUNTED = ("grains",)     # poured onto the boards, which have the printed number without them
 
 
 @experiment("hot.settings", title="Settings of HOT's scenes and methods",
@@ -180,9 +179,8 @@ def record_size(run, name):
     scene = sized(f"hot_{name}", "paper")
     scale = f"scenes/hot_{name}.toml at the paper's size"
     run.record(f"hot.table2.{name}.dx", scene.dx, scale=scale)
-    count = sum(body.sampling.count for body in scene.body if body.name not in POURED)
-    if count:
-        run.record(f"hot.table2.{name}.particles", count, scale=scale)
+    count = sum(entered(body) for body in scene.body if body.name not in UNCOUNTED)
+    run.record(f"hot.table2.{name}.particles", count, scale=scale)
 
 
 def record_metals(run):

@@ -9,6 +9,8 @@ At the printed size bodies are those of the release, where the user names their 
 
 from math import inf
 
+import numpy as np
+
 from mpm_ref.hot.methods import METHODS
 from mpm_ref.store.text import counted
 
@@ -67,9 +69,19 @@ def record_run(run, name, scene, patience):
 
 def keep_states(run, history, stress):
     """Keep particles at the times of the pictures, few and rounded enough to be published."""
-    shown = even_subset(history.x[0], MOST)
+    shown = shown_particles(history.x)
     scalars = {"stress": history.stress[:, shown]} if stress else {}
     keep(run, times=history.times, body=history.body[shown], x=history.x[:, shown], **scalars)
+
+
+def shown_particles(x):
+    """Return the numbers of at most `MOST` particles, evenly spread at the start of a run; at its
+    last picture where some enter during the run, all at one place.
+    """
+    if np.isfinite(x[0]).all():
+        return even_subset(x[0], MOST)
+    seen = np.flatnonzero(np.isfinite(x[-1]).all(axis=1))
+    return seen[even_subset(x[-1, seen], MOST)]
 
 
 def scale_text(history):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from figures.common.splats import DARK, Balls, Camera, image, outward
-from figures.common.state_panels import SceneView, load_history, states
+from figures.common.state_panels import SceneView, load_history, scene_cloud, states
 from mpm_ref.scene import build
 from validation.common.registry import discover
 from validation.common.results import ProfileResults
@@ -48,6 +48,34 @@ def test_particles_have_the_same_places_throughout_a_history(history):
     np.testing.assert_array_equal(history.x[0], body.particles.x[np.argsort(body.id)]
                                   .astype(np.float32))
     assert np.linalg.norm(history.x[1] - history.x[0], axis=1).max() < 0.06
+
+
+@pytest.fixture(scope="module")
+def poured():
+    scene = catalogue_scene("hot_sauce", unstable="allow", dx=0.09, end=0.5)
+    body = scene.body[0]
+    return run(with_(scene, body=(with_(body, sampling=with_(body.sampling, count=60)),)), 1e3)
+
+
+def test_particles_that_enter_are_in_a_history_from_then_on(poured):
+    there = np.isfinite(poured.x).all(axis=2)
+    assert there.shape == (13, 180)
+    assert len(poured.body) == 180
+    assert there[0].sum() == 60
+    assert there[-1].all()
+    assert np.all(there[1:] >= there[:-1])
+    np.testing.assert_array_equal(np.isfinite(poured.speed), there)
+    assert poured.facts["mass"][1] == pytest.approx(3.0 * poured.facts["mass"][0])
+    assert poured.column("gap").max() < 1e-13       # what enters is no part of the step's balance
+
+
+def test_poured_particles_are_kept_by_their_last_places(poured, monkeypatch):
+    monkeypatch.setattr(whole_runs, "MOST", 50)
+    shown = whole_runs.shown_particles(poured.x)
+    assert len(set(shown)) == 50
+    assert shown.max() >= 120
+    early = poured.x[:5]
+    assert np.isfinite(early[-1, whole_runs.shown_particles(early)]).all()
 
 
 def test_momentum_balances_only_with_the_impulse_of_the_conditions(history, monkeypatch):
@@ -156,6 +184,17 @@ def test_states_are_drawn_and_missing_ones_named(history, tmp_path):
                                               scalar=("stress", 1e-6, "stress [MPa]")))
     assert [ax.get_title() for ax in figure.axes[:2]] == ["t = 0.00 s", "t = 0.12 s"]
     assert len(figure.axes) == 3        # with the colour bar; of a short run, the last picture
+
+
+def test_states_of_a_pour_are_drawn_with_what_is_there(poured, tmp_path):
+    results = ProfileResults(tmp_path)
+    run = SimpleNamespace(folder=tmp_path, experiment=SimpleNamespace(id="hot.scenes.sauce"))
+    whole_runs.keep_states(run, poured, stress=True)
+    kept = load_history(results, "sauce")
+    assert len(scene_cloud(kept, 0, np.ones((180, 3))).x) == 60
+    figure = states(results, "sauce", SceneView((0, 12), ("viridis",),
+                                            scalar=("stress", 1e-6, "stress [MPa]")))
+    assert len(figure.axes) == 3
 
 
 # The trade
