@@ -139,8 +139,9 @@ def map_facts(one):
 
 def answer_lines(facts):
     """Return the answer as lines of text."""
-    return [*base_lines(facts), *wrong_lines(facts), "", *nearest_lines(facts), "",
-            *tolerance_lines(facts), "", *(one["sentence"] for one in facts["directions"]),
+    return [*base_lines(facts), *unresolved_lines(facts), *wrong_lines(facts), "",
+            *nearest_lines(facts), "", *tolerance_lines(facts), "",
+            *(one["sentence"] for one in facts["directions"]),
             *left_out_lines(facts), "", *map_lines(facts), *budget_lines(facts)]
 
 
@@ -319,6 +320,14 @@ def fails_together(cell, cells):
         alone.get(pair) == RIGHT for pair in cell["factors"].items())
 
 
+def unresolved_lines(facts):
+    """Return a warning for each quantity that the scene as given does not resolve."""
+    return [f"warning: the grid of the scene as given does not resolve {text}: a run counts as "
+            f"right within {percent(share)}, so that right and wrong mean little"
+            for text, share in facts["tolerance"].items()
+            if share > max(UNRESOLVED, facts["error"])]
+
+
 def tolerance_lines(facts):
     """Return what counts as right, and why that is more than the error asked."""
     tolerances = facts["tolerance"].items()
@@ -327,11 +336,9 @@ def tolerance_lines(facts):
     if not wider:
         return [f"what counts as right: {shares}, the error asked"]
     own = ", ".join(percent(share / facts["slack"]) for share in wider.values())
-    lines = [f"what counts as right: {shares}, not the {percent(facts['error'])} asked"
-             f"{only(wider, tolerances)}: the scene as given differs from itself at dx/2 by {own}, "
-             f"and {facts['slack']:g} times that is allowed; a smaller dx asks for more"]
-    return lines + [f"  the grid does not resolve {text}: right and wrong mean little here"
-                    for text, share in wider.items() if share > UNRESOLVED]
+    return [f"what counts as right: {shares}, not the {percent(facts['error'])} asked"
+            f"{only(wider, tolerances)}: the scene as given differs from itself at dx/2 by {own}, "
+            f"and {facts['slack']:g} times that is allowed; a smaller dx asks for more"]
 
 
 def only(wider, tolerances):

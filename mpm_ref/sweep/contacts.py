@@ -1,7 +1,9 @@
 """Contacts of bodies with colliders, walls and each other during a run.
 
-Two surfaces are in contact where they come within one cell: particles reach half their spacing
-beyond their position, and the grid joins what shares a node.
+Two surfaces are in contact where they come within one cell, and what moves no longer brings them
+nearer: particles reach half their spacing beyond their position, and the grid joins what shares a
+node. A body that falls freely towards its floor until the end of a run has no contact with it,
+however near it starts.
 """
 
 from itertools import combinations
@@ -12,35 +14,48 @@ from scipy.spatial import cKDTree
 from ..preflight import depths_in_solids
 
 REACH = 1.0         # cells between two surfaces that are in contact
+FREE = 0.5          # of the way of the fastest particle: approach by more than that is no contact
 
 
 class ContactRecorder:
     """Collects the contacts of a run: a dict of their texts, in the order of their first time."""
 
     def __init__(self, problem):
-        self._problem, self.contacts = problem, {}
+        self._problem, self.contacts, self._gaps = problem, {}, {}
 
-    def note(self, bodies, t):
-        """Add the contacts of bodies in a state at time t [s]."""
-        self.contacts |= dict.fromkeys([*solid_contacts(self._problem, bodies, t),
-                                        *body_contacts(bodies, self._problem.dx)])
+    def note(self, bodies, t, travel):
+        """Add the contacts of bodies in a state at time t [s].
+
+        travel: longest way [m] of a particle since the last call, at which a gap is compared.
+        """
+        gaps = {**solid_gaps(self._problem, bodies, t), **body_gaps(bodies, self._problem.dx)}
+        self.contacts |= {text: None for text, gap in gaps.items()
+                          if self._gaps.get(text, np.inf) - gap <= FREE * travel}
+        self._gaps = gaps
 
 
-def solid_contacts(problem, bodies, t):
-    """Yield a text for each body in contact with a collider or a wall of a problem at t [s]."""
+def solid_gaps(problem, bodies, t):
+    """Return {text: gap [m]} of each body within a cell of a collider or a wall of a problem at
+    t [s].
+    """
+    gaps = {}
     for body in bodies:
         reach = REACH * problem.dx + 0.5 * spacing(body)
         for name, depth in depths_in_solids(problem, body.particles.x, t):
             if depth.max() >= -reach:
-                yield f"body {body.name!r} with {name}"
+                gaps[f"body {body.name!r} with {name}"] = -depth.max()
+    return gaps
 
 
-def body_contacts(bodies, dx):
-    """Yield a text for each pair of bodies in contact on a grid of spacing dx [m]."""
+def body_gaps(bodies, dx):
+    """Return {text: gap [m]} of each pair of bodies within a cell, on a grid of spacing dx [m]."""
+    gaps = {}
     for a, b in combinations(bodies, 2):
         reach = REACH * dx + 0.5 * (spacing(a) + spacing(b))
-        if distance(a.particles.x, b.particles.x, reach) <= reach:
-            yield f"body {a.name!r} with body {b.name!r}"
+        gap = distance(a.particles.x, b.particles.x, reach)
+        if gap <= reach:
+            gaps[f"body {a.name!r} with body {b.name!r}"] = gap
+    return gaps
 
 
 def spacing(body):

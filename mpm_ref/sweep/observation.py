@@ -174,8 +174,12 @@ class RunObserver:
         """
         self._way += dt * max(np.abs(body.particles.v).max() for body in state.bodies)
         if self._way > 0.25 * REACH * self._problem.dx:
-            self._contacts.note(state.bodies, state.t)
-            self._way = 0.0
+            self._look(state.bodies)
+
+    def _look(self, bodies):
+        """Note the contacts of bodies now."""
+        self._contacts.note(bodies, self._t, self._way)
+        self._way = 0.0
 
     def _sample_step(self, t, times):
         now = self._sample()
@@ -188,7 +192,7 @@ class RunObserver:
 
     def _sample(self):
         bodies = self._problem.bodies
-        self._contacts.note(bodies, self._t)
+        self._look(bodies)
         probes = {body.name: self._weights[body.name] @ initial_order(body) for body in bodies
                   if body.name in self._weights}
         impulses = {} if self._recorder is None else self._recorder.impulses()

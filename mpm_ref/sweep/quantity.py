@@ -28,6 +28,7 @@ QUANTILES = np.linspace(0.02, 0.98, 33)
 ENERGIES = ("kinetic", "elastic", "gravity", "energy")
 DEFAULT = ("positions",)
 CHAOTIC = ("kinetic", "elastic")        # see `with_companions`
+BESIDE = 0.1        # of the largest extent of the bodies: a path may start so far beside them
 
 
 class Snapshot(NamedTuple):
@@ -66,7 +67,7 @@ class OutputQuantity:
     def sample(self, snapshot):
         """Return the value (k,) in a `Snapshot` of a scene that it fits (see `check_quantities`).
 
-        Raises ValueError where a region holds no material.
+        Raises ValueError where a region holds no material, or a path starts outside of it.
         """
         try:
             return np.atleast_1d(SAMPLES[self.kind](snapshot, self.record)).ravel()
@@ -124,8 +125,18 @@ def centroid(snapshot, record):
 def path(snapshot, record):
     """Return the position (d,) of the probe that starts nearest to a point."""
     starts = np.concatenate(list(snapshot.starts.values()))
+    low, high = starts.min(axis=0), starts.max(axis=0)
+    spare = BESIDE * (high - low).max()
+    if np.any((record.point < low - spare) | (record.point > high + spare)):
+        raise ValueError("the point lies outside of all bodies at the start, which extend from "
+                         f"{point_text(low)} to {point_text(high)}; expected a point of a body")
     nearest = np.argmin(np.sum((starts - record.point) ** 2, axis=1))
     return np.concatenate(list(snapshot.probes.values()))[nearest]
+
+
+def point_text(x):
+    """Return a point (d,) as text [m]."""
+    return f"({', '.join(f'{one:.4g}' for one in x)})"
 
 
 def region(snapshot, record):

@@ -283,8 +283,9 @@ def shortfalls(facts):
         elif error > asked:
             halvings = max(1, ceil(log2(error / asked) / order))
             finest = facts["grids"][-1] / 2**halvings
-            texts.append(f"{text} is known to {percent(error)}; a reference of {percent(asked)} "
-                         f"would take dx = {finest:.3g} m, {price_text(facts, halvings)}")
+            texts.append(f"{text} is known to {percent(error)}; if errors go on falling with order "
+                         f"{order:.2g} as on the last grids, a reference of {percent(asked)} takes "
+                         f"dx = {finest:.3g} m, {price_text(facts, halvings)}")
     if not texts and is_number(facts["chaos"]):
         return ["chaos ends what can be known"]
     if not texts:

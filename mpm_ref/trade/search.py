@@ -2,7 +2,7 @@
 
 1. The scene's own setting runs on at least four halved grids, until their reference is known to
    half the error asked for the whole run, stops improving, or the next grid does not fit into the
-   budget.
+   budget. Grids that are stored from a search before are always used.
 2. The scene's own setting, and each single knob, walk over the grids from the coarsest on, whose
    runs cost least, until they keep the error or can no longer be cheaper than the best so far.
 3. Pairs of the single knobs that keep the error cheapest walk likewise.
@@ -89,11 +89,13 @@ class TradeSearch:
         """Halve the grid until the reference is known, stops improving, or the budget says so."""
         self.idle = 0
         while self.levels and (len(self.levels) < GRIDS_OF_REFERENCE
-                               or self.horizon() < self.times[-1]):
+                               or self.horizon() < self.times[-1]
+                               or self.is_stored(setting(dx=self.levels[-1] / 2.0))):
             chosen, n, before = setting(dx=self.levels[-1] / 2.0), len(self.levels), self.horizon()
             if not self.is_next_grid(chosen):
                 break
-            side_runs = self.side_runs(self.expected_cpu(chosen))
+            free = 0.0 if self.is_stored(chosen) else self.expected_cpu(chosen)
+            side_runs = self.side_runs(free)
             self.observe([chosen, *side_runs], most_cpu=np.inf)
             self.update_references()
             self.idle = self.idle + 1 if 0.0 < self.horizon() <= before else 0
@@ -104,10 +106,14 @@ class TradeSearch:
         """Return whether a finer grid is run for the reference; one that is stored always is."""
         if chosen.get("dx") < self.finest:
             return False
-        if self.runs.has(RunRequest(self._scene_at(chosen))):
+        if self.is_stored(chosen):
             return True
         helps = self.idle <= PATIENCE or len(self.levels) < GRIDS_OF_REFERENCE
         return helps and self.expected_cpu(chosen) <= REFERENCE_SHARE * self.runs.left
+
+    def is_stored(self, chosen):
+        """Return whether a setting needs no run: its observation is stored, or it is refused."""
+        return self.runs.has(RunRequest(self._scene_at(chosen)))
 
     def side_runs(self, cpu):
         """Return candidates that the other workers can run during a reference run of so much CPU

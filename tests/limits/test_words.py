@@ -11,6 +11,7 @@ from mpm_ref.limits.answer import (
     nearest,
     sentence,
     tolerance_lines,
+    unresolved_lines,
     wrong_text,
 )
 from mpm_ref.limits.cause import RESOLUTION, VANISHING
@@ -98,8 +99,15 @@ def test_a_wider_tolerance_than_asked_has_its_reason():
                     "the scene as given differs from itself at dx/2 by 15 %, and 2 times that is "
                     "allowed; a smaller dx asks for more")
     assert "asked: the scene" in tolerances(a=0.4, b=0.3)[0]
-    assert tolerances(a=0.6)[1:] == ["  the grid does not resolve a: right and wrong mean little "
-                                     "here"]
+
+
+def test_an_unresolved_quantity_is_the_first_that_is_said():
+    assert unresolved_lines({"tolerance": {"a": 0.6, "b": 0.3}, "error": 0.05}) == [
+        "warning: the grid of the scene as given does not resolve a: a run counts as right within "
+        "60 %, so that right and wrong mean little"]
+    assert unresolved_lines({"tolerance": {"a": 0.6}, "error": 0.6}) == []
+    lines = answer_lines(FACTS | {"maps": [], "tolerance": {"a": 0.6}, "warnings": []})
+    assert "does not resolve a" in lines[0]
 
 
 FACTS = {

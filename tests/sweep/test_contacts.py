@@ -5,7 +5,7 @@ import pytest
 from sweep_scenes import BOUNCE, observed_run, scene_of
 
 from mpm_ref.scene import build, loads
-from mpm_ref.sweep.contacts import body_contacts, distance, solid_contacts, spacing
+from mpm_ref.sweep.contacts import ContactRecorder, body_gaps, distance, solid_gaps, spacing
 from mpm_ref.sweep.observation import observe
 
 BLOCKS = """
@@ -42,17 +42,18 @@ def blocks(dim, gap):
 @pytest.mark.parametrize(("gap", "touches"), [(0.0, True), (0.05, True), (0.15, False)])
 def test_bodies_are_in_contact_within_a_cell(dim, gap, touches):
     problem = blocks(dim, gap)
-    assert list(body_contacts(problem.bodies, problem.dx)) == (
-        ["body 'left' with body 'right'"] if touches else [])
+    gaps = body_gaps(problem.bodies, problem.dx)
+    assert list(gaps) == ["body 'left' with body 'right'"] * touches
+    assert list(gaps.values()) == [pytest.approx(gap + 0.05)] * touches      # of the particles
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_walls_are_solids(dim):
     problem = blocks(dim, 1.0)
-    assert list(solid_contacts(problem, problem.bodies, 0.0)) == []
+    assert solid_gaps(problem, problem.bodies, 0.0) == {}
     problem.bodies[0].particles.x[:, 0] -= 0.31
-    assert list(solid_contacts(problem, problem.bodies, 0.0)) == [
-        "body 'left' with the low wall of axis 0"]
+    gaps = solid_gaps(problem, problem.bodies, 0.0)
+    assert gaps == {"body 'left' with the low wall of axis 0": pytest.approx(0.115)}
 
 
 def test_spacing_is_that_of_the_sampling():
@@ -71,14 +72,14 @@ def test_contact_is_noted_during_the_run_alone():
     scene = scene_of(BOUNCE)
     assert observe(observed_run(scene)).contacts == ("body 'block' with collider[0] 'floor'",)
     problem = build(scene)
-    assert list(solid_contacts(problem, problem.bodies, 0.0)) == []
+    assert list(solid_gaps(problem, problem.bodies, 0.0)) == []
 
 
 def test_a_moving_collider_comes_near():
     text = BOUNCE + 'motion = { translation = { type = "steady", rate = [0.0, 0.5] } }\n'
     problem = build(loads(text))
-    assert list(solid_contacts(problem, problem.bodies, 0.0)) == []
-    assert list(solid_contacts(problem, problem.bodies, 0.25))
+    assert list(solid_gaps(problem, problem.bodies, 0.0)) == []
+    assert list(solid_gaps(problem, problem.bodies, 0.25))
 
 
 def test_a_quick_contact_between_two_observations_is_noted():
@@ -86,3 +87,31 @@ def test_a_quick_contact_between_two_observations_is_noted():
     text = BOUNCE.replace("[0.5, -1.0]", "[0.0, -30.0]").replace("E = 1e5", "E = 1e7")
     result = observe(observed_run(loads(text), n=2))
     assert result.contacts == ("body 'block' with collider[0] 'floor'",)
+
+
+def record(gaps, ways):
+    """Return the texts that a recorder notes of two cubes at some gaps, with ways between them."""
+    recorder = ContactRecorder(blocks(2, gaps[0]))
+    for gap, way in zip(gaps, ways, strict=True):
+        recorder.note(blocks(2, gap).bodies, 0.0, way)
+    return list(recorder.contacts)
+
+
+@pytest.mark.parametrize(("gaps", "ways", "noted"), [
+    ((0.08, 0.05, 0.02), (0.0, 0.03, 0.03), False),         # falls freely, near from the start on
+    ((0.08, 0.05, 0.02, 0.01), (0.0, 0.03, 0.03, 0.03), True),      # and is stopped
+    ((0.05, 0.05), (0.0, 0.0), True),                       # rests
+    ((0.15, 0.02, 0.06), (0.0, 0.13, 0.04), True),          # bounces between two looks
+    ((0.05, 0.08), (0.0, 0.03), True),                      # leaves
+    ((0.3, 0.2), (0.0, 0.0), False),                        # never comes near
+])
+def test_what_still_approaches_freely_has_no_contact(gaps, ways, noted):
+    assert record(gaps, ways) == ["body 'left' with body 'right'"] * noted
+
+
+@pytest.mark.parametrize(("end", "noted"), [(0.02, False), (0.3, True)])
+def test_a_body_that_starts_near_its_floor_has_no_contact_before_it_gets_there(end, noted):
+    """The floor is 0.06 m below, within a cell of 0.1 m; in 0.02 s gravity takes the block 2 mm."""
+    text = BOUNCE.replace("[0.5, -1.0]", "[0.0, 0.0]").replace("[0.2, 0.3]", "[0.2, 0.16]")
+    result = observe(observed_run(loads(text.replace("end = 0.3", f"end = {end}"))))
+    assert result.contacts == ("body 'block' with collider[0] 'floor'",) * noted

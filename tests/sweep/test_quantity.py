@@ -33,7 +33,7 @@ def test_shapes_and_values(snapshot):
     now = energy(snapshot.bodies, problem.gravity, problem.inertia)
     assert value("positions", snapshot) == pytest.approx(x[:7].ravel())
     assert value("centroid", snapshot) == pytest.approx([0.4, 0.5])
-    assert value("path:0.3,0.4", snapshot).shape == (2,)
+    assert value("path:0.225,0.4", snapshot).shape == (2,)
     assert value("kinetic", snapshot) == pytest.approx([now.kinetic])
     assert value("energy", snapshot) == pytest.approx([now.sum])
     assert value("impulse:floor", snapshot) == pytest.approx([1.0, 2.0])
@@ -69,6 +69,12 @@ def test_the_centroid_is_that_of_the_mass(snapshot):
     q.m[:] = 0.0
     q.m[3], q.m[-1] = 1.0, 3.0
     assert value("centroid", snapshot) == pytest.approx(0.25 * q.x[3] + 0.75 * q.x[-1])
+
+
+def test_a_path_starts_in_a_body(snapshot):
+    with pytest.raises(ValueError, match=r"'path:9,9': the point lies outside of all bodies at the "
+                                         r"start, which extend from .*; expected a point of"):
+        value("path:9,9", snapshot)
 
 
 def test_a_path_is_that_of_the_nearest_probe(snapshot):

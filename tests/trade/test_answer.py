@@ -67,7 +67,7 @@ def test_without_an_answer_words_say_what_it_would_take():
     assert "do not approach one solution" in text
     _, facts = facts_of(ModelRuns(left=20.0), error=1e-3)
     text = "\n".join(answer_lines(facts))
-    assert re.search(r"a reference of 0\.05 % would take dx = \S+ m", text)
+    assert re.search(r"a reference of 0\.05 % takes dx = \S+ m", text)
 
 
 def test_without_a_known_error_the_differences_of_the_grids_are_given():
@@ -246,7 +246,7 @@ def test_words_say_until_when_the_advice_holds_and_what_is_known_longer():
 
 def test_the_grid_that_it_would_take_is_the_one_that_suffices():
     _, facts = facts_of(ModelRuns(left=20.0), error=6e-3)
-    dx = float(re.search(r"would take dx = (\S+) m", "\n".join(answer_lines(facts)))[1])
+    dx = float(re.search(r" % takes dx = (\S+) m", "\n".join(answer_lines(facts)))[1])
     search = search_of(ModelRuns(), 6e-3)
     search.run()
     assert dx == pytest.approx(search.scene.dx * search.levels[-1], rel=2e-3)

@@ -56,7 +56,7 @@ def test_what_is_out_of_reach_has_no_budget():
     assert "--budget" not in text
     assert "out of reach" not in next_grid_text(facts | {"budget": cpu / 999.0})
     needed = shortfalls(facts | {"budget": cpu / 999.0})[0]
-    assert re.search(r"would take dx = \S+ m, about .* of CPU time, which is out of reach", needed)
+    assert re.search(r"takes dx = \S+ m, about .* of CPU time, which is out of reach", needed)
 
 
 def test_a_grid_that_is_never_run_is_no_promise():

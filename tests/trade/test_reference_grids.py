@@ -48,6 +48,19 @@ def test_a_grid_that_is_stored_is_always_taken():
     assert search.levels[-1] == 0.25
 
 
+def test_a_stored_grid_is_taken_also_where_the_error_needs_none():
+    runs = ModelRuns()
+    search = search_of(runs, error=0.5)
+    search.run()
+    assert search.levels[-1] > 1 / 16
+    runs = ModelRuns()
+    runs.has = lambda request: request.scene.dx > 0.1 / 17.0
+    finer = search_of(runs, error=0.5)
+    finer.run()
+    assert finer.levels[-1] == 1 / 16
+    assert finer.reference_error() < search.reference_error()
+
+
 def test_a_grid_past_one_that_failed_is_no_reference():
     runs = ModelRuns()
     runs.fails = lambda text: text == "dx x 0.25"
