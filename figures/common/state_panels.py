@@ -142,8 +142,13 @@ def scene_layers(history, k, conditions, view, colour_of):
     if conditions is not None:
         solid += [surface(part, where, SOLID) for part in conditions.colliders]
         prescribed += [surface(part, where, PRESCRIBED) for part in conditions.prescribed
-                       if view.show_prescribed and not part.inside]
+                       if view.show_prescribed and is_shown(part, where[0])]
     return join_balls(solid), join_balls(prescribed)
+
+
+def is_shown(part, t):
+    """Return whether a prescribed region is shown at time t [s]: while its nodes are held."""
+    return not part.inside and part.since <= t <= part.until
 
 
 def join_balls(parts):

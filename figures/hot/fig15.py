@@ -10,7 +10,7 @@ from ..common.style import legend_below, scales, series
 NEEDS = ["hot.fig15"]
 LABELS = {"gast15": "Gast15", "pn-pcg": "PN-PCG", "pn-pcg-mf": "PN-PCG (MF)",
           "lbfgs-h": "LBFGS-H", "lbfgs-gmg": "LBFGS-GMG", "pn-mgpcg": "PN-MGPCG",
-          "hot-quadratic": "HOT-quadratic", "hot": "HOT"}
+          "pn-mgpcg-flexible": "PN-MGPCG, flexible", "hot-quadratic": "HOT-quadratic", "hot": "HOT"}
 
 
 def scale(results):
@@ -24,10 +24,11 @@ def draw(results):
     for name in table["scene"]:
         places.setdefault(name, len(places))
     figure, axes = plt.subplots(2, 1, figsize=(7.0, 5.4), sharex=True)
-    width = 0.9 / len(LABELS)
-    for k, (method, label) in enumerate(LABELS.items()):
+    shown = {method: label for method, label in LABELS.items() if (method,) in by_method}
+    width, middle = 0.9 / len(shown), (len(shown) - 1) / 2.0
+    for k, (method, label) in enumerate(shown.items()):
         rows = by_method[method,]
-        x = np.array([places[name] for name in table["scene"][rows]]) + (k - 3.5) * width
+        x = np.array([places[name] for name in table["scene"][rows]]) + (k - middle) * width
         for ax, ratio in zip(axes, ("total", "worst"), strict=True):
             bars = ax.bar(x, table[ratio][rows], width, color=f"C{k}", label=label)
             mark_capped(bars, table["capped"][rows])

@@ -1,9 +1,9 @@
 """Contacts of bodies with colliders, walls and each other during a run.
 
-Two surfaces are in contact where they come within one cell, and what moves no longer brings them
-nearer: particles reach half their spacing beyond their position, and the grid joins what shares a
-node. A body that falls freely towards its floor until the end of a run has no contact with it,
-however near it starts.
+Two surfaces are in contact where they come within one cell, and approach each other by less than
+half of the way of their bodies: particles reach half their spacing beyond their position, and the
+grid joins what shares a node. So a body that falls freely towards its floor until the end of a run
+has no contact with it, however near it starts; one that slides along it or leaves it has.
 """
 
 from itertools import combinations
@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from ..preflight import depths_in_solids
 
 REACH = 1.0         # cells between two surfaces that are in contact
-FREE = 0.5          # of the way of the fastest particle: approach by more than that is no contact
+FREE = 0.5          # of the way of the fastest particles: approach by more than that is no contact
 
 
 class ContactRecorder:
@@ -26,35 +26,40 @@ class ContactRecorder:
     def note(self, bodies, t, travel):
         """Add the contacts of bodies in a state at time t [s].
 
-        travel: longest way [m] of a particle since the last call, at which a gap is compared.
+        travel: {name of a body: longest way [m] of a particle since the last call}, with which the
+        change of a gap since then is compared.
         """
         gaps = {**solid_gaps(self._problem, bodies, t), **body_gaps(bodies, self._problem.dx)}
-        self.contacts |= {text: None for text, gap in gaps.items()
-                          if self._gaps.get(text, np.inf) - gap <= FREE * travel}
+        for (text, names), gap in gaps.items():
+            before = self._gaps.get((text, names), np.inf)
+            if before - gap <= FREE * sum(travel[name] for name in names):
+                self.contacts[text] = None
         self._gaps = gaps
 
 
 def solid_gaps(problem, bodies, t):
-    """Return {text: gap [m]} of each body within a cell of a collider or a wall of a problem at
-    t [s].
+    """Return {(text, names of bodies): gap [m]} of each body within a cell of a collider or a wall
+    of a problem at t [s].
     """
     gaps = {}
     for body in bodies:
         reach = REACH * problem.dx + 0.5 * spacing(body)
         for name, depth in depths_in_solids(problem, body.particles.x, t):
             if depth.max() >= -reach:
-                gaps[f"body {body.name!r} with {name}"] = -depth.max()
+                gaps[f"body {body.name!r} with {name}", (body.name,)] = -depth.max()
     return gaps
 
 
 def body_gaps(bodies, dx):
-    """Return {text: gap [m]} of each pair of bodies within a cell, on a grid of spacing dx [m]."""
+    """Return {(text, names): gap [m]} of each pair of bodies within a cell, on a grid of spacing
+    dx [m].
+    """
     gaps = {}
     for a, b in combinations(bodies, 2):
         reach = REACH * dx + 0.5 * (spacing(a) + spacing(b))
         gap = distance(a.particles.x, b.particles.x, reach)
         if gap <= reach:
-            gaps[f"body {a.name!r} with body {b.name!r}"] = gap
+            gaps[f"body {a.name!r} with body {b.name!r}", (a.name, b.name)] = gap
     return gaps
 
 

@@ -140,7 +140,8 @@ class RunObserver:
         self._rows, self._before, self._t = [], None, 0.0
         self._clock = StepClock()
         self._nodes = 0
-        self._contacts, self._way = ContactRecorder(problem), 0.0
+        self._contacts = ContactRecorder(problem)
+        self._way = dict.fromkeys((body.name for body in problem.bodies), 0.0)
         self._indicators = IndicatorWatch(problem)
         self._warnings = misplaced(problem)
 
@@ -172,14 +173,15 @@ class RunObserver:
         """Note the contacts where bodies may have moved by half of their reach since the last
         time.
         """
-        self._way += dt * max(np.abs(body.particles.v).max() for body in state.bodies)
-        if self._way > 0.25 * REACH * self._problem.dx:
+        for body in state.bodies:
+            self._way[body.name] += dt * np.abs(body.particles.v).max()
+        if max(self._way.values()) > 0.25 * REACH * self._problem.dx:
             self._look(state.bodies)
 
     def _look(self, bodies):
         """Note the contacts of bodies now."""
         self._contacts.note(bodies, self._t, self._way)
-        self._way = 0.0
+        self._way = dict.fromkeys(self._way, 0.0)
 
     def _sample_step(self, t, times):
         now = self._sample()
@@ -192,7 +194,8 @@ class RunObserver:
 
     def _sample(self):
         bodies = self._problem.bodies
-        self._look(bodies)
+        if self._t == 0.0 or any(self._way.values()):       # else nothing has moved since
+            self._look(bodies)
         probes = {body.name: self._weights[body.name] @ initial_order(body) for body in bodies
                   if body.name in self._weights}
         impulses = {} if self._recorder is None else self._recorder.impulses()

@@ -28,7 +28,7 @@ QUANTILES = np.linspace(0.02, 0.98, 33)
 ENERGIES = ("kinetic", "elastic", "gravity", "energy")
 DEFAULT = ("positions",)
 CHAOTIC = ("kinetic", "elastic")        # see `with_companions`
-BESIDE = 0.1        # of the largest extent of the bodies: a path may start so far beside them
+BESIDE = 0.1        # of the largest extent of all bodies: a path may start so far beside their box
 
 
 class Snapshot(NamedTuple):
@@ -128,7 +128,7 @@ def path(snapshot, record):
     low, high = starts.min(axis=0), starts.max(axis=0)
     spare = BESIDE * (high - low).max()
     if np.any((record.point < low - spare) | (record.point > high + spare)):
-        raise ValueError("the point lies outside of all bodies at the start, which extend from "
+        raise ValueError("the point lies outside of the box of all bodies at the start, from "
                          f"{point_text(low)} to {point_text(high)}; expected a point of a body")
     nearest = np.argmin(np.sum((starts - record.point) ** 2, axis=1))
     return np.concatenate(list(snapshot.probes.values()))[nearest]

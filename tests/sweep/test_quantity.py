@@ -72,8 +72,8 @@ def test_the_centroid_is_that_of_the_mass(snapshot):
 
 
 def test_a_path_starts_in_a_body(snapshot):
-    with pytest.raises(ValueError, match=r"'path:9,9': the point lies outside of all bodies at the "
-                                         r"start, which extend from .*; expected a point of"):
+    with pytest.raises(ValueError, match=r"'path:9,9': the point lies outside of the box of all "
+                                         r"bodies at the start, from .*; expected a point of"):
         value("path:9,9", snapshot)
 
 

@@ -120,7 +120,7 @@ def other_scenes(run):
         new = [cost(name, k, setup, iterates(step, setup, max_iterations=CAP))
                for k, step in enumerate(following_steps(problem, state, count))
                for setup in DESCENTS]
-        record_lbfgs(run, name, new, f"{particle_count(problem.bodies)} particles, "
+        record_lbfgs(run, name, new, f"{particle_count(state.bodies)} particles, "
                      f"{step_text(count)} from {START_TIMES[name]:g} s on")
         costs += new
     slower = [ratio([c for c in costs if c.scene == name], "cpu") for name in SOFT]

@@ -26,8 +26,9 @@ from ..common.provenance import commit
 from ..common.results import ROOT
 
 SHOTS = 12          # pictures after that of the start, evenly over the run
-COLUMNS = ("step", "t", "dt", "iterations", "coarse", "residual", "converged", "backtracks",
-           "evaluations", "solve", "cpu", "kinetic", "elastic", "gravity", "support", "gap")
+COLUMNS = ("step", "t", "dt", "particles", "iterations", "coarse", "residual", "converged",
+           "backtracks", "evaluations", "solve", "cpu", "kinetic", "elastic", "gravity", "support",
+           "gap")
 FIELDS = ("x", "speed", "stress")
 
 
@@ -100,10 +101,11 @@ def step_to_end(problem, stepper, state, log, patience):
     while not ended(problem.clock, state):
         if process_time() - start > patience:
             return f"more than {patience} CPU seconds"
-        before, since = state.bodies, process_time()
-        start_of_step = StepStart([len(b.id) for b in before], momentum(before), mass(before))
+        counts = [len(body.id) for body in state.bodies]
+        before = StepStart(counts, momentum(state.bodies), mass(state.bodies))
+        since = process_time()
         dt = advance(problem, stepper, state)
-        log.step(state, dt, start_of_step, process_time() - since)
+        log.step(state, dt, before, process_time() - since)
         if frame_is_due(problem.clock, state):
             log.shot(show(state, dt))
     return "end"
@@ -136,8 +138,8 @@ class Log:
         """Add the row of a step that led from the `StepStart` before to a state."""
         report, q = state.solve, energy(state.bodies, self.problem.gravity, self.problem.inertia)
         self.rows.append((
-            state.step, state.t, dt, report.iterations, report.coarse_iterations,
-            report.residuals[-1],
+            state.step, state.t, dt, sum(before.counts), report.iterations,
+            report.coarse_iterations, report.residuals[-1],
             report.converged, report.backtracks, report.evaluations, sum(report.seconds.values()),
             cpu, *q, np.linalg.norm(self.stepper.impulse) / dt, self.gap(state, dt, before)))
 

@@ -15,9 +15,9 @@ FILL = 0.87         # of the release's particles per cell, by the numbers of Tab
 class Size(NamedTuple):
     """Grid spacing of a scene at each profile [m]; None where the paper prints none."""
 
-    quick: float            # 3000 to 6000 particles, of poured sauce in the first 0.6 s: as the
-                            # scene is catalogue_scene
-    standard: float         # 15 000 to 60 000
+    quick: float            # 3000 to 6000 particles, as the scene is catalogue_scene; of what is
+                            # poured, those of the first 0.6 s count
+    standard: float         # 15 000 to 60 000 likewise
     paper: float | None
 
 
@@ -63,6 +63,8 @@ def entered(body, t=inf):
     """
     if body.source is None:
         return body.sampling.count
+    if t < body.source.start:
+        return 0
     v, length, stop = stream_of(body)
     period = length / float(v @ v)**0.5
     return body.sampling.count * blocks_until((body.source.start, period), stop, t)

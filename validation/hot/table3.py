@@ -48,7 +48,7 @@ def costs(name, profile, count):
     """Return {preconditioner: `RowCost`} of a row."""
     problem, state = warm_state(name, profile)
     by_method, advanced = reports(problem, state, count)
-    return {short: cost((name, short, particle_count(problem.bodies)), solves, advanced)
+    return {short: cost((name, short, particle_count(state.bodies)), solves, advanced)
             for short, solves in by_method.items()}
 
 

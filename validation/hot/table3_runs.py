@@ -11,7 +11,6 @@ from mpm_ref.scene import build
 from mpm_ref.simulate import EVEN, ended, simulate
 
 from ..common.registry import experiment
-from ..common.scenes import particle_count
 from .one_step import implicit_step, solve_step
 from .table3 import METHODS, cost
 from .warm_states import PRINTED, next_step_length, scene, take_step
@@ -39,10 +38,9 @@ def steps_evenly(problem, count):
 def measure(name, count):
     """Return ({preconditioner: `RowCost`}, rows of COLUMNS) of a scene's entire run."""
     problem = build(scene(name, SIZE))
-    size, by_method = particle_count(problem.bodies), {short: [] for short in METHODS}
-    advanced, rows = 0.0, []
+    advanced, rows, by_method = 0.0, [], {short: [] for short in METHODS}
     for state, step in steps_evenly(problem, count):
-        advanced += step.dt
+        advanced, size = advanced + step.dt, step.particles
         for short, method in METHODS.items():
             report = solve_step(step, method).report
             by_method[short].append(report)
@@ -64,7 +62,8 @@ def table3_runs(run):
         for short, mean in costs.items():
             few, most = np.quantile([row[6] for row in rows if row[4] == short], (0.0, 1.0))
             run.record(f"hot.table3.{name}.{short}.cg_iters.small", mean.cg,
-                       scale=f"{mean.particles} particles, {mean.steps} steps evenly over the run",
+                       scale=f"up to {mean.particles} particles, {mean.steps} steps evenly over "
+                       "the run",
                        note=f"{few:.0f} to {most:.0f} by step; {mean.newton:.1f} Newton steps"
                        + ("" if mean.converged else "; not every step converged"))
     run.table("steps", COLUMNS, table)

@@ -19,10 +19,9 @@ from mpm_ref.simulate import (
     bound_is_due,
     ended,
     frame_is_due,
-    next_dt,
+    length_of_step,
     show,
     simulate,
-    swiftest,
     update_bound,
 )
 from mpm_ref.store.checkpoint import BadCheckpoint, load, save
@@ -117,7 +116,7 @@ def next_step_length(problem, stepper, state):
         stepper.sort(state.bodies)
     if bound_is_due(problem.clock, state):
         update_bound(problem, stepper, state)
-    return next_dt(problem.clock, state, swiftest(problem, stepper, state))
+    return length_of_step(problem, stepper, state)
 
 
 def cache_folder(root=None):

@@ -88,7 +88,8 @@ def scale_text(history):
     """Return the size and the length of a run as text."""
     t, end = history.column("t")[-1] if len(history.steps) else 0.0, history.facts["end"]
     length = f"{end:.3g} s" if history.facts["why"] == "end" else f"{t:.3g} of {end:.3g} s"
-    return (f"{len(history.body)} particles, dx = {history.facts['dx']:.4g} m, {length} in "
+    count = int(np.isfinite(history.x[-1]).all(axis=1).sum())
+    return (f"{count} particles, dx = {history.facts['dx']:.4g} m, {length} in "
             f"{len(history.steps)} steps")
 
 
@@ -115,18 +116,18 @@ def record_cost(run, name, history):
     run.record(f"{id}.backtracks", float(history.column("backtracks").sum()), unit="1",
                comparator="info", scale=scale, note="trial steps refused, in the whole run")
     cpu = history.column("cpu").sum()
-    run.record(f"{id}.cpu", 1e6 * cpu / (len(history.steps) * len(history.body)), unit="us",
+    run.record(f"{id}.cpu", 1e6 * cpu / history.column("particles").sum(), unit="us",
                comparator="info", scale=scale, note=f"CPU time per particle and step; "
                f"{cpu:.0f} s in all, {history.column('solve').sum() / cpu:.0%} of it in the solves")
 
 
-sauce = scene_experiment("sauce", 20)
+sauce = scene_experiment("sauce", 90)
 boxes = scene_experiment("boxes", 90, quick=0.05)
 donut = scene_experiment("donut", 120)
 wheel = scene_experiment("wheel", 20)
 twist = scene_experiment("twist", 120)
 faceless = scene_experiment("faceless", 10)
-boards = scene_experiment("boards", 40)
+boards = scene_experiment("boards", 110)
 armacat = scene_experiment("armacat", 30)
 chain = scene_experiment("chain", 240)
 aluminium = scene_experiment("aluminium", 20)

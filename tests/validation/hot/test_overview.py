@@ -1,14 +1,25 @@
 """States in the middle of HOT's scenes, and ratios of times and errors of their experiments."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from mpm_ref.hot.methods import printed
 from mpm_ref.scene import Body, Box, Material, Regular, Scene, Scheme, build
 from mpm_ref.simulate import SORT, simulate
 from mpm_ref.store.checkpoint import digest
 from validation.common import targets
 from validation.hot import warm_states as states
-from validation.hot.overview import ABLATION, MethodCost, options, overview
+from validation.hot.overview import (
+    ABLATION,
+    FLEXIBLE,
+    METHODS,
+    MethodCost,
+    options,
+    overview,
+    solver,
+)
 from validation.trade.hot_start import carry_increments, start_increments
 
 
@@ -120,3 +131,9 @@ def test_starts_of_a_step_are_admissible(cache):
     np.testing.assert_allclose(begin["gravity"], [[0.0, -9.8 * second.dt]] * len(q.m), rtol=1e-14)
     assert set(np.unique(begin["last"])) <= {0.0, 1.0}
     assert begin["last"].any()
+
+
+def test_one_more_row_has_a_flexible_method_of_the_printed_options():
+    assert solver(FLEXIBLE) == replace(printed("pn-mgpcg"), flexible=True) != printed("pn-mgpcg")
+    assert [solver(method) for method in METHODS if method != FLEXIBLE] == [
+        method for method in METHODS if method != FLEXIBLE]
