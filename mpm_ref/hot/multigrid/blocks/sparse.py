@@ -6,7 +6,7 @@ import numpy as np
 
 from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ....core.tensor import cofactor, det, mat, mlin, put_mat, trace, transpose
-from ..projectors import inverses, is_regular
+from ..projectors import REGULAR, inverses, onto_range
 
 BLOCK_SIZES = ((2, 2), (3, 3))
 SERIAL = 4000                       # nodes below which starting threads costs more than they save
@@ -38,25 +38,23 @@ def blocks_of(A):
 
 
 @kernel
-def find(A, i, j):
-    """Place of block (i, j) in A, whose rows are sorted; -1 if it is not stored."""
-    low, high = A.start[i], A.start[i + 1]
+def place_from(A, i, j):
+    """Place of the first block of row i whose column is j or more, in A, whose rows are sorted."""
+    low, high = np.int64(A.start[i]), np.int64(A.start[i + 1])
     while low < high:
         middle = (low + high) // 2
         if A.column[middle] < j:
             low = middle + 1
         else:
             high = middle
-    if low < A.start[i + 1] and A.column[low] == j:
-        return low
-    return -1
+    return low
 
 
 @kernel
 def _diagonal(A, D):
     for i in range(len(D)):
-        e = find(A, i, i)
-        if e >= 0:
+        e = place_from(A, i, i)
+        if e < A.start[i + 1] and A.column[e] == i:
             put_mat(D, i, mat(A.data, e, A.like.shape))
 
 
@@ -91,7 +89,30 @@ def coupling_radius(A, index):
     return int(radius.max())
 
 
-# inverses of diagonal blocks: by cofactors where a node moves freely, else as `projectors` do
+# projectors and inverses of diagonal blocks: at once where a node moves freely, else as in
+# `projectors`
+
+
+@kernel
+def _find_regular(D, regular, like):
+    for i in range(len(D)):
+        block = mat(D, i, like)
+        mean = trace(block) / len(like)
+        regular[i] = mean > 0.0 and det(mlin(1.0 / mean, block, 0.0, block)) > REGULAR
+
+
+def _others(D):
+    """Numbers of the blocks D (n, d, d) that are not regular, as `projectors.is_regular`."""
+    regular = np.empty(len(D), dtype=np.bool_)
+    _find_regular(D, regular, (0,) * D.shape[1])
+    return np.flatnonzero(~regular)
+
+
+def free_directions(D):
+    """`projectors.onto_range` (n, d, d) of diagonal blocks D."""
+    B, other = np.tile(np.eye(D.shape[1]), (len(D), 1, 1)), _others(D)
+    B[other] = onto_range(D[other])
+    return B
 
 
 @kernel
@@ -111,6 +132,6 @@ def inverse_blocks(D, B):
     """
     out = np.empty_like(D)
     _invert(D, out, (0,) * D.shape[1])
-    other = np.flatnonzero(~is_regular(D))
+    other = _others(D)
     out[other] = inverses(D[other], B[other])
     return out
