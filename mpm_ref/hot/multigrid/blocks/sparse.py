@@ -70,9 +70,10 @@ def diagonal(A):
 def _coupling_radius(A, index, bounds):
     radius = 0
     for i in range(bounds[0], bounds[1]):
-        for e in range(A.start[i], A.start[i + 1]):
-            for a in range(index.shape[1]):
-                radius = max(radius, abs(index[A.column[e], a] - index[i, a]))
+        for a in range(index.shape[1]):
+            own = index[i, a]
+            for e in range(np.uint64(A.start[i]), np.uint64(A.start[i + 1])):
+                radius = max(radius, abs(index[np.uint64(A.column[e]), a] - own))
     return radius
 
 
@@ -94,24 +95,27 @@ def coupling_radius(A, index):
 
 
 @kernel
-def _find_regular(D, regular, like):
+def _sort_out(D, regular, partly, like):
+    """Which blocks are surely of full rank, as `projectors.is_regular`; which others are not zero."""
     for i in range(len(D)):
         block = mat(D, i, like)
         mean = trace(block) / len(like)
         regular[i] = mean > 0.0 and det(mlin(1.0 / mean, block, 0.0, block)) > REGULAR
+        partly[i] = not regular[i] and mean != 0.0
 
 
-def _others(D):
-    """Numbers of the blocks D (n, d, d) that are not regular, as `projectors.is_regular`."""
-    regular = np.empty(len(D), dtype=np.bool_)
-    _find_regular(D, regular, (0,) * D.shape[1])
-    return np.flatnonzero(~regular)
+def _sorted_out(D):
+    """(which blocks D (n, d, d) are regular, numbers of those that may be held in part)."""
+    regular, partly = np.empty((2, len(D)), dtype=np.bool_)
+    _sort_out(D, regular, partly, (0,) * D.shape[1])
+    return regular, np.flatnonzero(partly)
 
 
 def free_directions(D):
     """`projectors.onto_range` (n, d, d) of diagonal blocks D."""
-    B, other = np.tile(np.eye(D.shape[1]), (len(D), 1, 1)), _others(D)
-    B[other] = onto_range(D[other])
+    regular, partly = _sorted_out(D)
+    B = regular[:, None, None] * np.eye(D.shape[1])
+    B[partly] = onto_range(D[partly])
     return B
 
 
@@ -130,8 +134,8 @@ def inverse_blocks(D, B):
     """Pseudo-inverses (n, d, d) of diagonal blocks D on the ranges of projectors B, as
     `projectors.inverses`.
     """
-    out = np.empty_like(D)
+    out = np.zeros_like(D)
     _invert(D, out, (0,) * D.shape[1])
-    other = _others(D)
-    out[other] = inverses(D[other], B[other])
+    _, partly = _sorted_out(D)
+    out[partly] = inverses(D[partly], B[partly])
     return out
