@@ -5,7 +5,7 @@ import pytest
 import scipy.sparse as sp
 
 from mpm_ref.hot.multigrid.blocks.galerkin import galerkin
-from mpm_ref.hot.multigrid.blocks.sparse import blocks_of
+from mpm_ref.hot.multigrid.blocks.sparse import blocks_of, coupling_radius
 from mpm_ref.hot.multigrid.blocks.sweep import split
 from mpm_ref.hot.multigrid.blocks.transfer import transfer
 from mpm_ref.hot.multigrid.embedding import embed, taps
@@ -76,3 +76,11 @@ def test_halves_in_the_order_of_the_sweep(d, kind, rng):
     for half in (m.L, m.U):
         row = np.repeat(np.arange(n), np.diff(half.start))
         assert (np.diff(row * n + half.column) > 0).all()              # columns ascend in a row
+
+
+def test_coupling_radius_is_the_largest_of_all_axes(d):
+    for axis in range(d):
+        index = np.zeros((2, d), dtype=np.int64)
+        index[1, axis] = 3
+        A = sp.bsr_array(np.ones((2 * d, 2 * d)), blocksize=(d, d))
+        assert coupling_radius(blocks_of(A), index) == 3
