@@ -96,7 +96,7 @@ def coupling_radius(A, index):
 
 @kernel
 def _sort_out(D, regular, partly, like):
-    """Which blocks are surely of full rank, as `projectors.is_regular`; which others are not zero."""
+    """Which blocks surely have full rank, as `projectors.is_regular`; which others are not zero."""
     for i in range(len(D)):
         block = mat(D, i, like)
         mean = trace(block) / len(like)
