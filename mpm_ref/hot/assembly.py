@@ -20,7 +20,19 @@ from scipy.sparse import bsr_array
 
 from ..core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ..core.stencil import column, columns, gradient, node, slopes_per_axis, weights_per_axis
-from ..core.tensor import mat, mlin, mm, mmt, mv, outer, put_mat, put_vec, transpose, vec
+from ..core.tensor import (
+    mat,
+    mlin,
+    mm,
+    mmt,
+    mv,
+    outer,
+    plus_diagonal,
+    put_mat,
+    put_vec,
+    transpose,
+    vec,
+)
 from ..materials.principal import apply
 from .quadrature import pairs_of
 
@@ -51,7 +63,7 @@ def assembled(bodies, unknowns, pattern, stencil):
     for points, modes in bodies:
         for color in (0, 1):
             _assemble_color(points, modes, stencil, unknowns.dx, matrix, color)
-    _complete_all(matrix.data, pattern, unknowns.m)
+    _complete_all(matrix.data, pattern, unknowns.m, unknowns.number.shape)
     return bsr_array((matrix.data, pattern.indices, pattern.indptr), (n * d, n * d))
 
 
@@ -182,27 +194,27 @@ def flush(K, first, matrix, like):
 
 
 @kernel
-def complete(data, pattern, m, bounds):
+def complete(data, pattern, m, like, bounds):
     """H_ij = H_ji^T for j < i, and masses on the diagonal, in the rows from bounds[0] on."""
     last = pattern.block.shape[1] - 1
     for i in range(bounds[0], bounds[1]):
         for o in range(last // 2):
             k = pattern.block[i, o]
             if k >= 0:
-                put_transposed(data, k, pattern.block[pattern.indices[k], last - o])
+                mirrored = pattern.block[pattern.indices[k], last - o]
+                put_mat(data, k, transpose(mat(data, mirrored, like)))
         k = pattern.block[i, last // 2]
-        for a in range(data.shape[1]):
-            data[k, a, a] += m[i]
-        put_transposed(data, k, k)
+        put_mat(data, k, from_upper(plus_diagonal(mat(data, k, like), m[i])))
 
 
 @kernel
-def put_transposed(data, k, l):
-    """Block k = block l^T, as its upper triangle says where they are the same."""
-    for a in range(data.shape[1]):
-        for b in range(data.shape[1]):
-            if k != l or b < a:
-                data[k, a, b] = data[l, b, a]
+def from_upper(A):
+    """The symmetric matrix of the upper triangle of A."""
+    if len(A) == 2:
+        return (A[0][0], A[0][1]), (A[0][1], A[1][1])
+    else:
+        return ((A[0][0], A[0][1], A[0][2]), (A[0][1], A[1][1], A[1][2]),
+                (A[0][2], A[1][2], A[2][2]))
 
 
 @parallel
@@ -215,9 +227,9 @@ def _assemble_color(points, modes, stencil, dx, matrix, color):
 
 
 @parallel
-def _complete_all(data, pattern, m):
+def _complete_all(data, pattern, m, like):
     for c in prange(CHUNKS):
-        complete(data, pattern, m, chunk(c, len(m)))
+        complete(data, pattern, m, like, chunk(c, len(m)))
 
 
 # sparsity: one block for every pair of nodes that a particle can reach

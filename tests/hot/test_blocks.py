@@ -6,10 +6,17 @@ import pytest
 import scipy.sparse as sp
 from multigrid_matrices import case
 
+from mpm_ref.core import jit
 from mpm_ref.core.jit import set_threads
 from mpm_ref.hot.multigrid import blocks
 from mpm_ref.hot.multigrid.blocks.product import planes_of, product
-from mpm_ref.hot.multigrid.blocks.sparse import blocks_of, coupling_radius, diagonal, inverse_blocks
+from mpm_ref.hot.multigrid.blocks.sparse import (
+    blocks_of,
+    coupling_radius,
+    diagonal,
+    free_directions,
+    inverse_blocks,
+)
 from mpm_ref.hot.multigrid.blocks.sweep import Sweep, correct, residual, split, sweep
 from mpm_ref.hot.multigrid.hierarchy import hierarchy
 from mpm_ref.hot.multigrid.projectors import diagonal_blocks, inverses, onto_range
@@ -36,6 +43,7 @@ def test_products_diagonals_and_inverses(c, rng):
     np.testing.assert_array_equal(D, diagonal_blocks(c.A))
     B = onto_range(D)
     close(B, c.B)
+    np.testing.assert_array_equal(free_directions(D), B)
     close(inverse_blocks(D, B), inverses(D, B))
     assert coupling_radius(A, c.index) == 2
 
@@ -114,6 +122,7 @@ def test_the_same_bits_in_parallel(monkeypatch, rng):
     serial = hierarchy(c.A, c.index).cycle(b)
     for module in (blocks.product, blocks.sweep, blocks.transfer):
         monkeypatch.setattr(module, "SERIAL", 0)
+    monkeypatch.setattr(jit, "few_items", 0)
     before = numba.get_num_threads()
     set_threads(min(2, numba.config.NUMBA_NUM_THREADS))
     try:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from multigrid_matrices import NORMAL
 
-from mpm_ref.hot.multigrid.embedding import TAPS, embed, kernel_value, width
+from mpm_ref.hot.multigrid.embedding import TAPS, embed, embed_onto, kernel_value, width
 from mpm_ref.hot.multigrid.projectors import coarse_nodes, inverses, onto_range
 
 KERNELS = ("linear", "quadratic")
@@ -24,6 +24,16 @@ def spline(x, kernel):
     if kernel == "linear":
         return np.maximum(1 - x, 0)
     return np.where(x < 0.5, 0.75 - x**2, np.maximum(1.5 - x, 0) ** 2 / 2)
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_what_hangs_on_other_nodes_is_left_out(d, kernel, rng):
+    index = ragged(d, rng)
+    W, coarse = embed(index, kernel)
+    given = rng.random(len(coarse)) < 0.5
+    onto = embed_onto(index, coarse[given], kernel)
+    np.testing.assert_array_equal(onto.toarray(), W.toarray()[:, given])
+    assert onto.nnz == np.count_nonzero(onto.toarray())
 
 
 @pytest.mark.parametrize("kernel", KERNELS)

@@ -11,7 +11,7 @@ from multigrid_matrices import case, dense, free_basis
 
 from mpm_ref.hot.multigrid import coarsest
 from mpm_ref.hot.multigrid.embedding import embed
-from mpm_ref.hot.multigrid.hierarchy import hierarchy
+from mpm_ref.hot.multigrid.hierarchy import hierarchy, hierarchy_from_matrices
 from mpm_ref.hot.multigrid.smoothers import SLAB, coloured
 
 PATHS = ("scipy", "blocks")
@@ -239,11 +239,14 @@ def test_wrong_words_are_refused(wrong, said):
         hierarchy(c.A, c.index, **wrong)
 
 
-def test_wrong_matrices_are_refused():
+@pytest.mark.parametrize("path", PATHS)
+def test_wrong_matrices_are_refused(path):
     c = small(2)
     with pytest.raises(ValueError, match=r"expected .* in blocks"):
-        hierarchy(c.A, c.index[1:])
+        hierarchy(c.A, c.index[1:], implementation=path)
     blown = c.A.copy()
     blown.data[:] = np.nan
     with pytest.raises(ValueError, match="not finite"):
-        hierarchy(blown, c.index)
+        hierarchy(blown, c.index, implementation=path)
+    with pytest.raises(ValueError, match="not finite"):
+        hierarchy_from_matrices([(blown, c.index)], path)

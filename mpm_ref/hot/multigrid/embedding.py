@@ -5,7 +5,6 @@ the grid's storage begins. Finer nodes act as particles of the coarser level (HO
 i hangs on coarse node c with the weight N(i/2 - c) of a B-spline, axis by axis.
 """
 
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -52,17 +51,13 @@ def embed(index, kernel="linear"):
     any others.
     """
     index = np.asarray(index, dtype=np.int64)
-    rows, c, w = _pairs(index, kernel)
-    low = index.min(axis=0, initial=0) // 2 - 1
-    box = tuple(index.max(axis=0, initial=0) // 2 + 3 - low)
-    key = np.ravel_multi_index(tuple((c - low).T), box)
+    low, box = _box(index)
+    key, w = _weights(index, kernel, low, box)
     there = np.zeros(np.prod(box), dtype=bool)
-    there[key] = True
+    there[key[w > 0.0]] = True
     number = np.cumsum(there, dtype=np.int32) - 1
     coarse = np.stack(np.unravel_index(np.flatnonzero(there), box), axis=1) + low
-    W = sp.csr_array(sp.coo_array((w, (rows, number[key])), shape=(len(index), len(coarse))))
-    W.sort_indices()
-    return Embedding(W, coarse)
+    return Embedding(_matrix(w, number[key], w > 0.0, len(coarse)), coarse)
 
 
 def embed_onto(index, coarse, kernel="linear"):
@@ -70,32 +65,39 @@ def embed_onto(index, coarse, kernel="linear"):
 
     What would hang on other nodes is left out.
     """
-    rows, c, w = _pairs(np.asarray(index, dtype=np.int64), kernel)
-    both = np.concatenate((c, coarse))
-    low = both.min(axis=0, initial=0)
-    box = tuple(both.max(axis=0, initial=0) + 1 - low)
-    number = np.full(np.prod(box), -1)
+    index = np.asarray(index, dtype=np.int64)
+    low, box = _box(np.concatenate((index, 2 * coarse)))
+    key, w = _weights(index, kernel, low, box)
+    number = np.full(np.prod(box), -1, dtype=np.int32)
     number[np.ravel_multi_index(tuple((coarse - low).T), box)] = np.arange(len(coarse))
-    column = number[np.ravel_multi_index(tuple((c - low).T), box)]
-    there = column >= 0
-    entries = w[there], (rows[there], column[there])
-    W = sp.csr_array(sp.coo_array(entries, shape=(len(index), len(coarse))))
-    W.sort_indices()
-    return W
+    return _matrix(w, number[key], (w > 0.0) & (number[key] >= 0), len(coarse))
 
 
-def _pairs(index, kernel):
-    """(fine node, coarse index (d,), weight) of every pair of positive weight."""
-    axes = [parents(i, kernel) for i in index.T]
-    per_axis = range(axes[0][0].shape[1])
-    rows, coarse, weights = [], [], []
-    for choice in product(per_axis, repeat=len(axes)):
-        w = np.prod([axis[1][:, k] for axis, k in zip(axes, choice)], axis=0)
-        keep = np.flatnonzero(w > 0.0)
-        rows.append(keep)
-        weights.append(w[keep])
-        coarse.append(np.stack([axis[0][keep, k] for axis, k in zip(axes, choice)], axis=1))
-    return np.concatenate(rows), np.concatenate(coarse), np.concatenate(weights)
+def _box(index):
+    """(lowest index, shape) of a box with all coarse nodes that nodes index (n, d) can hang on."""
+    low = index.min(axis=0, initial=0) // 2 - 1
+    return low, tuple(index.max(axis=0, initial=0) // 2 + 3 - low)
+
+
+def _weights(index, kernel, low, box):
+    """(place in the box, weight), (n, k) each, of the coarse nodes around each node of index
+    (n, d): lexicographic, with those of weight 0.
+    """
+    n = len(index)
+    key, weight = np.zeros((n, 1), dtype=np.int64), np.ones((n, 1))
+    for i, first, size in zip(index.T, low, box):
+        c, w = parents(i, kernel)
+        shape = n, key.shape[1] * c.shape[1]
+        key = (key[:, :, None] * size + (c - first)[:, None, :]).reshape(shape)
+        weight = (weight[:, :, None] * w[:, None, :]).reshape(shape)
+    return key, weight
+
+
+def _matrix(weight, column, keep, m):
+    """csr_array (n, m) of those weights (n, k) that are kept, in columns that ascend in a row."""
+    start = np.zeros(len(weight) + 1, dtype=np.int32)
+    np.cumsum(keep.sum(axis=1), out=start[1:])
+    return sp.csr_array((weight[keep], column[keep], start), shape=(len(weight), m))
 
 
 # The geometric view: a level of the Galerkin hierarchy is MPM on a coarser grid, wider kernel.

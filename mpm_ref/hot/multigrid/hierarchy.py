@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from .blocks import hierarchy as block_hierarchy
 from .coarsest import coarsest_solver, energy_norm, solve_by_cg
 from .options import DTYPES, cycle_options
-from .projectors import coarse_nodes, diagonal_blocks, inverses, onto_range, weights_onto
+from .projectors import checked, coarse_nodes, diagonal_blocks, inverses, onto_range, weights_onto
 from .smoothers import POLYNOMIAL, GaussSeidel, largest_eigenvalue, times
 
 
@@ -49,7 +49,7 @@ def galerkin(A, P):
 
 def build(A, index, levels, kernel):
     """Levels, finest first. Fewer than asked where coarsening would leave no node, or as many."""
-    D = diagonal_blocks(A)
+    D = checked(diagonal_blocks(A))
     B = onto_range(D)
     built = []
     for _ in range(levels - 1):
@@ -67,7 +67,7 @@ def build_from_matrices(matrices):
     """Levels of matrices and node indices that were made one by one, finest first."""
     built = []
     for (A, index), coarser in zip_longest(matrices, matrices[1:]):
-        D = diagonal_blocks(A)
+        D = checked(diagonal_blocks(A))
         B = onto_range(D)
         P = prolongation(weights_onto(index, B, coarser[1]), B) if coarser else None
         built.append(Level(A, P, index, B, D, inverses(D, B)))
@@ -203,13 +203,11 @@ def _implementation(word):
 
 
 def checked_index(A, index):
-    """Return the node indices (n, d) of A as integers; raises ValueError as `hierarchy`."""
+    """Return the node indices (n, d) of A as integers; raises ValueError if shapes do not match."""
     index = np.ascontiguousarray(index, dtype=np.int64)
     n, d = index.shape
     if A.shape != (n * d, n * d) or A.blocksize != (d, d):
         raise ValueError(
             f"matrix of shape {A.shape} in blocks {A.blocksize} for index of shape {index.shape}: "
             f"expected {(n * d, n * d)} in blocks {(d, d)}")
-    if not np.isfinite(A.diagonal()).all():
-        raise ValueError("the matrix has a diagonal that is not finite: has the state blown up?")
     return index

@@ -25,6 +25,13 @@ def diagonal_blocks(A):
     return D
 
 
+def checked(D):
+    """Return diagonal blocks D (n, d, d) of a matrix. Raises ValueError if one is not finite."""
+    if not np.isfinite(D).all():
+        raise ValueError("the matrix has a diagonal that is not finite: has the state blown up?")
+    return D
+
+
 def is_regular(D):
     """Return whether symmetric semi-definite blocks D (n, d, d) surely have full rank: the
     product of the eigenvalues, each over their mean, is far above round-off.

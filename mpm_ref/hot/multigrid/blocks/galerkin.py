@@ -14,9 +14,10 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ....core.jit import CHUNKS, chunk, kernel, parallel_if_many, prange
 from ....core.tensor import mat, mlin, put_mat, transpose
-from .sparse import BlockMatrix, find
+from ...assembly import pattern_of
+from .sparse import BlockMatrix
 
 
 class Stencil(NamedTuple):
@@ -52,6 +53,7 @@ class Rows(NamedTuple):
     weight: np.ndarray        # (k,)
     key: np.ndarray           # (n,)        of fine node, in the stencil of S
     origin: np.ndarray        # (m,)        key of fine node 2 c, minus the centre of S
+    run: np.ndarray           # (blocks,)   length of the run that begins with a block, see `_runs`
     skip: int                 # places below belong to c' < c alone
 
 
@@ -61,21 +63,43 @@ class ContractionPlan(NamedTuple):
     taps: np.ndarray          # N(o/2) of one axis
     fine: int                 # width of S
     coarse: int               # width of the coarse stencil
-    centre: int               # place of offset 0 in it
-    key: np.ndarray           # (m,)  of coarse node, in the coarse stencil
+
+
+@kernel
+def _runs(A, key, run, bounds):
+    """Lengths of the runs of rows: blocks that lie together in A and in S. They are written to
+    places of first blocks.
+    """
+    for i in range(bounds[0], bounds[1]):
+        k = A.start[i]
+        while k < A.start[i + 1]:
+            length = 1
+            while (k + length < A.start[i + 1]
+                   and key[A.column[k + length]] == key[A.column[k]] + length):
+                length += 1
+            run[k] = length
+            k += length
+
+
+@parallel_if_many
+def _all_runs(A, key, run):
+    for k in prange(CHUNKS):
+        _runs(A, key, run, chunk(k, len(key)))
 
 
 @kernel
 def _gather(A, rows, c, S):
-    """S[j - 2c] = sum_o N(o/2) H[2c + o, j], for one coarse node c."""
-    like = A.like.shape
-    S[:] = 0.0
+    """S[j - 2c] = sum_o N(o/2) H[2c + o, j], for one coarse node c, run by run."""
+    data, size = A.data.reshape(-1), A.like.ndim ** 2
+    S[rows.skip * size:] = 0.0
     for e in range(rows.start[c], rows.start[c + 1]):
-        i, w = rows.child[e], rows.weight[e]
-        for k in range(A.start[i], A.start[i + 1]):
-            at = rows.key[A.column[k]] - rows.origin[c]
-            if at >= rows.skip:
-                put_mat(S, at, mlin(1.0, mat(S, at, like), w, mat(A.data, k, like)))
+        i = rows.child[e]
+        k = A.start[i]
+        while k < A.start[i + 1]:
+            to = rows.key[A.column[k]] - rows.origin[c]
+            if to >= rows.skip:
+                _add(S, to * size, rows.weight[e], data, k * size, rows.run[k] * size)
+            k += rows.run[k]
 
 
 @kernel
@@ -108,82 +132,55 @@ def _sizes(axis, fine, coarse, inner):
 
 
 @kernel
-def _add(T, to, w, S, at, count):
-    for q in range(count):
-        T[to + q] += w * S[at + q]
+def _add(T, to, w, S, of, count):
+    """T[to + q] += w S[of + q]. Unsigned indices let the compiler use vectors."""
+    first, other = np.uint64(to), np.uint64(of)
+    for q in range(np.uint64(count)):
+        T[first + q] += w * S[other + q]
 
 
 @kernel
-def _write(C, plan, c, S):
-    """Row c of the coarse matrix from its diagonal on, and its transpose."""
-    here = plan.centre - plan.key[c]
-    for e in range(C.start[c], C.start[c + 1]):
-        if C.column[e] >= c:
-            block = mat(S, plan.key[C.column[e]] + here, C.like.shape)
+def _write(C, slot, c, S):
+    """Row c of the coarse matrix from its diagonal on, and its transpose; slot as in
+    `assembly.Pattern.block`.
+    """
+    last = slot.shape[1] - 1
+    for o in range(last // 2, last + 1):
+        e = slot[c, o]
+        if e >= 0:
+            block = mat(S, o, C.like.shape)
             if C.column[e] == c:
                 block = mlin(0.5, block, 0.5, transpose(block))
             put_mat(C.data, e, block)
-            put_mat(C.data, find(C, C.column[e], c), transpose(block))
+            put_mat(C.data, slot[C.column[e], last - o], transpose(block))
 
 
 @kernel
-def _coarse_rows(A, rows, C, plan, scratch, bounds):
+def _coarse_rows(A, rows, C, slot, plan, bounds):
     d = C.like.ndim
-    S, T = scratch
+    pair = np.empty((2, plan.fine**d * d * d))
     for c in range(bounds[0], bounds[1]):
-        _gather(A, rows, c, S.reshape(-1, d, d)[: plan.fine**d])
-        source, target = S, T
+        _gather(A, rows, c, pair[0])
+        source, target = pair[0], pair[1]
         for a in range(d):
             inner = plan.fine ** (d - 1 - a) * d * d
             _contract(source, target, _sizes(a, plan.fine, plan.coarse, inner), plan.taps)
             source, target = target, source
-        _write(C, plan, c, source.reshape(-1, d, d))
+        _write(C, slot, c, source.reshape(-1, d, d))
 
 
-@parallel
-def _all_coarse_rows(A, rows, C, plan, scratch):
+@parallel_if_many
+def _all_coarse_rows(A, rows, C, slot, plan):
     for k in prange(CHUNKS):
-        pair = scratch[0, k], scratch[1, k]
-        _coarse_rows(A, rows, C, plan, pair, chunk(k, len(rows.origin)))
+        _coarse_rows(A, rows, C, slot, plan, chunk(k, len(rows.origin)))
 
 
-@kernel
-def _count(box, place, offsets, start, bounds):
-    for c in range(bounds[0], bounds[1]):
-        for k in range(len(offsets)):
-            start[c + 1] += box[place[c] + offsets[k]] >= 0
-
-
-@kernel
-def _fill(box, place, offsets, start, column, bounds):
-    for c in range(bounds[0], bounds[1]):
-        to = start[c]
-        for k in range(len(offsets)):
-            j = box[place[c] + offsets[k]]
-            if j >= 0:
-                column[to] = j
-                to += 1
-
-
-def pattern(index, radius):
-    """(start, column) of the matrix that couples all nodes within `radius` of each other, for nodes
-    index (n, d) in lexicographic order.
-    """
-    low = index.min(axis=0) - radius
-    shape = index.max(axis=0) + radius + 1 - low
-    stride = np.append(np.cumprod(shape[:0:-1])[::-1], 1)
-    place = (index - low) @ stride
-    box = np.full(np.prod(shape), -1, dtype=np.int32)
-    box[place] = np.arange(len(index), dtype=np.int32)
-    one = np.arange(-radius, radius + 1)
-    axes = np.meshgrid(*[one] * index.shape[1], indexing="ij")
-    offsets = sum(a * s for a, s in zip(axes, stride)).reshape(-1)
-    start = np.zeros(len(index) + 1, dtype=np.int32)
-    _count(box, place, offsets, start, (0, len(index)))
-    np.cumsum(start, out=start)
-    column = np.empty(start[-1], dtype=np.int32)
-    _fill(box, place, offsets, start, column, (0, len(index)))
-    return start, column
+def _numbered(index):
+    """The box (n1, .., nd) around nodes index (n, d) with their numbers; -1 where there is none."""
+    place = index - index.min(axis=0)
+    number = np.full(place.max(axis=0) + 1, -1, dtype=np.int32)
+    number[tuple(place.T)] = np.arange(len(index))
+    return number
 
 
 def galerkin(A, index, to, coarse, radius, w):
@@ -191,15 +188,15 @@ def galerkin(A, index, to, coarse, radius, w):
     by the `Transfer` to, whose weights are products of the taps w of the axes; A couples up to
     `radius`.
     """
-    d, t = index.shape[1], len(w) // 2
-    wide, narrow = stencil(radius + t, d), stencil(coarse_radius(radius, w), d)
+    d, reach = index.shape[1], coarse_radius(radius, w)
+    wide = stencil(radius + len(w) // 2, d)
+    key, run = index @ wide.stride, np.empty(len(A.column), dtype=np.int32)
+    _all_runs(A, key, run)
     origin = 2 * coarse @ wide.stride - wide.centre
-    rows = Rows(*to.down, index @ wide.stride, origin, int(radius * wide.stride[0]))
-    start, column = pattern(coarse, narrow.width // 2)
-    C = BlockMatrix(start, column, np.empty((len(column), d, d)), A.like)
-    scratch = np.empty((2, CHUNKS, wide.width**d * d * d))
-    key = coarse @ narrow.stride
-    plan = ContractionPlan(np.array(w), wide.width, narrow.width, narrow.centre, key)
-    _all_coarse_rows(A, rows, C, plan, scratch)
+    rows = Rows(*to.down, key, origin, run, int(radius * wide.stride[0]))
+    pattern = pattern_of(_numbered(coarse), reach)
+    C = BlockMatrix(pattern.indptr, pattern.indices, np.empty((len(pattern.indices), d, d)), A.like)
+    plan = ContractionPlan(np.array(w), wide.width, 2 * reach + 1)
+    _all_coarse_rows(A, rows, C, pattern.block, plan)
     size = len(coarse) * d
     return sp.bsr_array((C.data, C.column, C.start), shape=(size, size))

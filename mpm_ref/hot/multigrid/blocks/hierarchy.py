@@ -11,12 +11,20 @@ import scipy.sparse as sp
 from ..coarsest import CAP, coarsest_solver, energy_norm, solve_by_cg
 from ..embedding import taps
 from ..options import DTYPES
-from ..projectors import coarse_nodes, onto_range, weights_onto
+from ..projectors import checked, coarse_nodes, weights_onto
 from ..smoothers import POLYNOMIAL, largest_eigenvalue, times
 from . import coarsest
 from .galerkin import coarse_radius, galerkin
 from .product import planes_of, product
-from .sparse import SERIAL, BlockMatrix, blocks_of, coupling_radius, diagonal, inverse_blocks
+from .sparse import (
+    SERIAL,
+    BlockMatrix,
+    blocks_of,
+    coupling_radius,
+    diagonal,
+    free_directions,
+    inverse_blocks,
+)
 from .sweep import Sweep, correct, residual, split, sweep
 from .transfer import Transfer, prolong, restrict, transfer
 
@@ -37,8 +45,8 @@ class BlockLevel(NamedTuple):
 def build(A, index, levels, kernel):
     """Levels, finest first, as `multigrid.hierarchy.build`."""
     blocks, w = blocks_of(A), taps(kernel)
-    D, radius = diagonal(blocks), coupling_radius(blocks, index)
-    B, built = onto_range(D), []
+    D, radius = checked(diagonal(blocks)), coupling_radius(blocks, index)
+    B, built = free_directions(D), []
     for _ in range(levels - 1):
         embedding, B_coarse = coarse_nodes(index, B, kernel)
         if not 0 < len(embedding.index) < len(index):
@@ -56,8 +64,8 @@ def build_from_matrices(matrices):
     built = []
     for (A, index), coarser in zip_longest(matrices, matrices[1:]):
         blocks = blocks_of(A)
-        D = diagonal(blocks)
-        B = onto_range(D)
+        D = checked(diagonal(blocks))
+        B = free_directions(D)
         to = transfer(weights_onto(index, B, coarser[1]), B) if coarser else None
         radius = coupling_radius(blocks, index)
         built.append(BlockLevel(A, index, B, D, inverse_blocks(D, B), radius, blocks, to))

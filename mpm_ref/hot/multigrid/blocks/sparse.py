@@ -6,7 +6,7 @@ import numpy as np
 
 from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
 from ....core.tensor import cofactor, det, mat, mlin, put_mat, trace, transpose
-from ..projectors import inverses, is_regular
+from ..projectors import REGULAR, inverses, onto_range
 
 BLOCK_SIZES = ((2, 2), (3, 3))
 SERIAL = 4000                       # nodes below which starting threads costs more than they save
@@ -38,25 +38,23 @@ def blocks_of(A):
 
 
 @kernel
-def find(A, i, j):
-    """Place of block (i, j) in A, whose rows are sorted; -1 if it is not stored."""
-    low, high = A.start[i], A.start[i + 1]
+def place_from(A, i, j):
+    """Place of the first block of row i whose column is j or more, in A, whose rows are sorted."""
+    low, high = np.int64(A.start[i]), np.int64(A.start[i + 1])
     while low < high:
         middle = (low + high) // 2
         if A.column[middle] < j:
             low = middle + 1
         else:
             high = middle
-    if low < A.start[i + 1] and A.column[low] == j:
-        return low
-    return -1
+    return low
 
 
 @kernel
 def _diagonal(A, D):
     for i in range(len(D)):
-        e = find(A, i, i)
-        if e >= 0:
+        e = place_from(A, i, i)
+        if e < A.start[i + 1] and A.column[e] == i:
             put_mat(D, i, mat(A.data, e, A.like.shape))
 
 
@@ -72,9 +70,10 @@ def diagonal(A):
 def _coupling_radius(A, index, bounds):
     radius = 0
     for i in range(bounds[0], bounds[1]):
-        for e in range(A.start[i], A.start[i + 1]):
-            for a in range(index.shape[1]):
-                radius = max(radius, abs(index[A.column[e], a] - index[i, a]))
+        for a in range(index.shape[1]):
+            own = index[i, a]
+            for e in range(np.uint64(A.start[i]), np.uint64(A.start[i + 1])):
+                radius = max(radius, abs(index[np.uint64(A.column[e]), a] - own))
     return radius
 
 
@@ -91,7 +90,33 @@ def coupling_radius(A, index):
     return int(radius.max())
 
 
-# inverses of diagonal blocks: by cofactors where a node moves freely, else as `projectors` do
+# projectors and inverses of diagonal blocks: at once where a node moves freely, else as in
+# `projectors`
+
+
+@kernel
+def _sort_out(D, regular, partly, like):
+    """Which blocks surely have full rank, as `projectors.is_regular`; which others are not zero."""
+    for i in range(len(D)):
+        block = mat(D, i, like)
+        mean = trace(block) / len(like)
+        regular[i] = mean > 0.0 and det(mlin(1.0 / mean, block, 0.0, block)) > REGULAR
+        partly[i] = not regular[i] and mean != 0.0
+
+
+def _sorted_out(D):
+    """(which blocks D (n, d, d) are regular, numbers of those that may be held in part)."""
+    regular, partly = np.empty((2, len(D)), dtype=np.bool_)
+    _sort_out(D, regular, partly, (0,) * D.shape[1])
+    return regular, np.flatnonzero(partly)
+
+
+def free_directions(D):
+    """`projectors.onto_range` (n, d, d) of diagonal blocks D."""
+    regular, partly = _sorted_out(D)
+    B = regular[:, None, None] * np.eye(D.shape[1])
+    B[partly] = onto_range(D[partly])
+    return B
 
 
 @kernel
@@ -109,8 +134,8 @@ def inverse_blocks(D, B):
     """Pseudo-inverses (n, d, d) of diagonal blocks D on the ranges of projectors B, as
     `projectors.inverses`.
     """
-    out = np.empty_like(D)
+    out = np.zeros_like(D)
     _invert(D, out, (0,) * D.shape[1])
-    other = np.flatnonzero(~is_regular(D))
-    out[other] = inverses(D[other], B[other])
+    _, partly = _sorted_out(D)
+    out[partly] = inverses(D[partly], B[partly])
     return out

@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ....core.jit import CHUNKS, chunk, kernel, parallel, parallel_if_many, prange
 from ....core.tensor import lin, mat, mv, put_vec, vec
 from ..smoothers import SLAB, coloured
 from .product import Planes, put_entries, row_times
-from .sparse import SERIAL
+from .sparse import SERIAL, place_from
 
 
 class SweepOrder(NamedTuple):
@@ -45,58 +45,98 @@ def split(A, D_inv, index, radius, dtype=float):
     """
     width = max(SLAB, radius)
     node = coloured(index, width).astype(np.int32)
-    place = np.empty_like(node)
-    place[node] = np.arange(len(node), dtype=np.int32)
     slab = index[node, 0] // width
     first = np.flatnonzero(np.diff(slab, prepend=slab[:1] - 1))
     second = int(np.searchsorted(slab[first] % 2, 1))
     order = SweepOrder(node, np.append(first, len(node)).astype(np.int32), second, D_inv)
-    L = _half(A, node, place, dtype)
-    U = _half(A, node[::-1].copy(), len(node) - 1 - place, dtype)
-    return Split(order, L, U)
+    return Split(order, *_halves(A, node, _slabs(index[:, 0] // width), dtype))
 
 
-def _half(A, order, place, dtype):
-    """The blocks of A whose column comes before their row in `order`, in that order of rows."""
-    n = len(order)
-    start = np.zeros(n + 1, dtype=np.int32)
-    _count_all(A, order, place, start)
-    np.cumsum(start, out=start)
-    column = np.empty(start[-1], dtype=np.int32)
-    half = Planes(start, column, np.empty((*A.data.shape[1:], start[-1]), dtype), A.like)
-    _copy_all(A, order, place, half)
-    return half
+class OwnSlab(NamedTuple):
+    """The slab of each node: nodes first .. last - 1, of the first or the second colour."""
+
+    first: np.ndarray      # (n,)
+    last: np.ndarray       # (n,)
+    second: np.ndarray     # (n,)   bool
 
 
-@kernel
-def _count(A, order, place, start, bounds):
-    for k in range(bounds[0], bounds[1]):
-        i = order[k]
-        for e in range(A.start[i], A.start[i + 1]):
-            start[k + 1] += place[A.column[e]] < k
+def _slabs(slab):
+    """`OwnSlab` of nodes that lie in those of ascending numbers slab (n,)."""
+    return OwnSlab(np.searchsorted(slab, slab), np.searchsorted(slab, slab, "right"), slab % 2 == 1)
 
 
-@parallel
-def _count_all(A, order, place, start):
-    for c in prange(CHUNKS):
-        _count(A, order, place, start, chunk(c, len(order)))
+def _halves(A, node, slabs, dtype):
+    """L and U of a BlockMatrix A in the order `node`, as in `Split`."""
+    starts = np.zeros((2, len(node) + 1), dtype=np.int32)
+    _count_all(node, A, slabs, starts)
+    np.cumsum(starts, axis=1, out=starts)
+    L, U = (Planes(start, np.empty(start[-1], dtype=np.int32),
+                   np.empty((*A.data.shape[1:], start[-1]), dtype), A.like) for start in starts)
+    _copy_all(node, A, slabs, L, U)
+    return L, U
 
 
 @kernel
-def _copy(A, order, place, half, bounds):
+def _parts(A, i, slabs):
+    """Where the blocks of row i that belong to L are in A, as two ranges, and those of U.
+
+    Columns ascend from the slab before that of i, over its own, to the one after. The slabs beside
+    those of the first colour come later in the sweep, and earlier beside those of the second.
+    """
+    start, stop = np.int64(A.start[i]), np.int64(A.start[i + 1])
+    first, last = place_from(A, i, slabs.first[i]), place_from(A, i, slabs.last[i])
+    below, above = place_from(A, i, i), place_from(A, i, i + 1)
+    if slabs.second[i]:
+        return ((start, below), (last, stop)), ((above, last), (stop, stop))
+    return ((first, below), (stop, stop)), ((start, first), (above, stop))
+
+
+@kernel
+def _length(ranges):
+    s = 0
+    for first, last in ranges:
+        s += last - first
+    return s
+
+
+@kernel
+def _count(node, A, slabs, starts, bounds):
+    n = len(node)
     for k in range(bounds[0], bounds[1]):
-        i, to = order[k], half.start[k]
-        for e in range(A.start[i], A.start[i + 1]):
-            if place[A.column[e]] < k:
-                half.column[to] = A.column[e]
-                put_entries(half.data, to, mat(A.data, e, A.like.shape))
-                to += 1
+        lower, upper = _parts(A, node[k], slabs)
+        starts[0, k + 1] = _length(lower)
+        starts[1, n - k] = _length(upper)
 
 
-@parallel
-def _copy_all(A, order, place, half):
+@parallel_if_many
+def _count_all(node, A, slabs, starts):
     for c in prange(CHUNKS):
-        _copy(A, order, place, half, chunk(c, len(order)))
+        _count(node, A, slabs, starts, chunk(c, len(node)))
+
+
+@kernel
+def _copy_row(A, ranges, half, k):
+    to = np.int64(half.start[k])
+    for first, last in ranges:
+        for e in range(first, last):
+            half.column[to] = A.column[e]
+            put_entries(half.data, to, mat(A.data, e, A.like.shape))
+            to += 1
+
+
+@kernel
+def _copy(node, A, slabs, halves, bounds):
+    n = len(node)
+    for k in range(bounds[0], bounds[1]):
+        lower, upper = _parts(A, node[k], slabs)
+        _copy_row(A, lower, halves[0], k)
+        _copy_row(A, upper, halves[1], n - 1 - k)
+
+
+@parallel_if_many
+def _copy_all(node, A, slabs, L, U):
+    for c in prange(CHUNKS):
+        _copy(node, A, slabs, (L, U), chunk(c, len(node)))
 
 
 class Sweep(NamedTuple):
