@@ -1,9 +1,10 @@
 """Contacts of bodies with colliders, walls and each other during a run.
 
-Two surfaces are in contact where they come within one cell, and approach each other by less than
-half of the way of their bodies: particles reach half their spacing beyond their position, and the
-grid joins what shares a node. So a body that falls freely towards its floor until the end of a run
-has no contact with it, however near it starts; one that slides along it or leaves it has.
+Two surfaces are in contact where they come within one cell, and have approached each other since
+the last look by less than half of the distance that the fastest particle of both bodies has gone:
+particles reach half their spacing beyond their position, and the grid joins what shares a node. So
+a body that falls straight to its floor until the end of a run has no contact with it, however near
+it starts; one that slides along it, leaves it, or comes at a grazing angle has.
 """
 
 from itertools import combinations
@@ -14,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..preflight import depths_in_solids
 
 REACH = 1.0         # cells between two surfaces that are in contact
-FREE = 0.5          # of the way of the fastest particles: approach by more than that is no contact
+FREE = 0.5          # of the way of the fastest particle: approach by more than that is no contact
 
 
 class ContactRecorder:
@@ -32,7 +33,7 @@ class ContactRecorder:
         gaps = {**solid_gaps(self._problem, bodies, t), **body_gaps(bodies, self._problem.dx)}
         for (text, names), gap in gaps.items():
             before = self._gaps.get((text, names), np.inf)
-            if before - gap <= FREE * sum(travel[name] for name in names):
+            if before - gap <= FREE * max(travel[name] for name in names):
                 self.contacts[text] = None
         self._gaps = gaps
 

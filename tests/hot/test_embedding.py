@@ -55,11 +55,12 @@ def test_linear_fields_are_kept(d, kernel, rng):
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
-def test_a_hierarchy_moves_with_the_lattice(d, kernel, rng):
+@pytest.mark.parametrize("shift", [-64, 2 * 10**9])         # so far away no box reaches the origin
+def test_a_hierarchy_moves_with_the_lattice(d, kernel, shift, rng):
     index = ragged(d, rng)
-    (W, coarse), (V, moved) = embed(index, kernel), embed(index - 64, kernel)
+    (W, coarse), (V, moved) = embed(index, kernel), embed(index + shift, kernel)
     assert (W != V).nnz == 0
-    np.testing.assert_array_equal(moved, coarse - 32)
+    np.testing.assert_array_equal(moved, coarse + shift // 2)
 
 
 def test_at_most_three_nodes_per_axis_meet_in_a_transfer(d, rng):      # HOT-nnz

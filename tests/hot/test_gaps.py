@@ -9,15 +9,15 @@ from mpm_ref.hot.multigrid.blocks.sparse import blocks_of, coupling_radius
 from mpm_ref.hot.multigrid.blocks.sweep import split
 from mpm_ref.hot.multigrid.blocks.transfer import transfer
 from mpm_ref.hot.multigrid.embedding import embed, taps
-from mpm_ref.hot.multigrid.smoothers import coloured
+from mpm_ref.hot.multigrid.smoothers import SLAB, coloured
 
 RADIUS = 2
 KINDS = ("full", "comb", "ragged")
 
 
-def lattice(d, kind, rng):
+def lattice(d, kind, rng, radius=RADIUS):
     """(symmetric matrix, world indices of its nodes): a box along the first axis that couples all
-    its nodes over RADIUS; only its nodes of even last index; or part of its nodes and blocks.
+    its nodes over a radius; only its nodes of even last index; or part of its nodes and blocks.
     """
     shape = (15, 6) if d == 2 else (15, 4, 5)
     index = np.stack(np.indices(shape), axis=-1).reshape(-1, d) - 3
@@ -26,7 +26,7 @@ def lattice(d, kind, rng):
     if kind == "ragged":
         index = index[rng.random(len(index)) < 0.8]
     n = len(index)
-    there = abs(index[:, None] - index).max(axis=2) <= RADIUS
+    there = abs(index[:, None] - index).max(axis=2) <= radius
     if kind == "ragged":                                  # blocks of the diagonal are missing too
         lower = np.tril(rng.random((n, n)) < 0.7)
         there &= lower | lower.T
@@ -60,12 +60,13 @@ def dense(half, rows):
     return blocks
 
 
+@pytest.mark.parametrize("radius", [RADIUS, SLAB + 1])
 @pytest.mark.parametrize("kind", KINDS)
-def test_halves_in_the_order_of_the_sweep(d, kind, rng):
-    A, index = lattice(d, kind, rng)
-    n, order = len(index), coloured(index)
+def test_halves_in_the_order_of_the_sweep(d, kind, radius, rng):
+    A, index = lattice(d, kind, rng, radius)
+    n, order = len(index), coloured(index, max(SLAB, radius))
     place = np.argsort(order)
-    m = split(blocks_of(A), np.zeros((n, d, d)), index, RADIUS)
+    m = split(blocks_of(A), np.zeros((n, d, d)), index, radius)
     blocks = A.toarray().reshape(n, d, n, d).transpose(0, 2, 1, 3)
     before = (place[None, :] < place[:, None])[:, :, None, None]
     after = (place[None, :] > place[:, None])[:, :, None, None]

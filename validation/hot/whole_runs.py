@@ -88,9 +88,10 @@ def scale_text(history):
     """Return the size and the length of a run as text."""
     t, end = history.column("t")[-1] if len(history.steps) else 0.0, history.facts["end"]
     length = f"{end:.3g} s" if history.facts["why"] == "end" else f"{t:.3g} of {end:.3g} s"
-    count = int(np.isfinite(history.x[-1]).all(axis=1).sum())
+    steps = len(history.steps)
+    count = int(history.column("particles")[-1]) if steps else len(history.body)
     return (f"{count} particles, dx = {history.facts['dx']:.4g} m, {length} in "
-            f"{len(history.steps)} steps")
+            f"{steps} steps")
 
 
 def record_end(run, name, history):

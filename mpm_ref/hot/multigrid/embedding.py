@@ -75,8 +75,10 @@ def embed_onto(index, coarse, kernel="linear"):
 
 def _box(index):
     """(lowest index, shape) of a box with all coarse nodes that nodes index (n, d) can hang on."""
-    low = index.min(axis=0, initial=0) // 2 - 1
-    return low, tuple(index.max(axis=0, initial=0) // 2 + 3 - low)
+    if not len(index):
+        index = np.zeros((1, index.shape[1]), dtype=np.int64)
+    low = index.min(axis=0) // 2 - 1
+    return low, tuple(index.max(axis=0) // 2 + 3 - low)
 
 
 def _weights(index, kernel, low, box):
