@@ -21,7 +21,7 @@ from .overview import (
 from .table3_runs import SIZE, steps_evenly
 from .warm_states import PRINTED, scene
 
-CAPS = {"max_iterations": 30, "max_cg_iterations": 1000}       # of Gast15
+CAPS = {"max_iterations": 15, "max_cg_iterations": 300}        # of Gast15
 
 
 def run_costs(name, count):
