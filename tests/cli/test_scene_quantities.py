@@ -45,7 +45,7 @@ def test_tables_of_the_scene_are_measured_unless_the_command_line_names_some(
 
 def test_a_recommended_scene_keeps_the_tables(tmp_path):
     (tmp_path / "flight.toml").write_text(FLIGHT + FRONT)
-    done = mpm_ref("trade", tmp_path / "flight.toml", "--error", "10%", "--budget", "10s", "--out",
+    done = mpm_ref("trade", tmp_path / "flight.toml", "--error", "10%", "--budget", "5min", "--out",
                    tmp_path, *SMALL)
     assert done.exit_code == 0, done.output
     facts = json.loads((tmp_path / "flight.trade.json").read_text())

@@ -1,10 +1,10 @@
 """Iterations of HOT on the bar of Figure 20 by the length of its steps.
 
-We once ran the authors' public code on this bar (30 720 particles, dx 0.015 m), and the log is no
-part of this repository: over 60 steps it took 2.5, 3.1 and 3.0 outer iterations a step for a middle
-of 1e5, 1e7 and 1e9 Pa. The lengths of its steps were not noted, but energies of runs with a
-tolerance eps of 1e-9 or less were: 0.849 J kinetic after 60 steps at 1e5 Pa, 1.264 J elastic after
-40 steps at 1e9 Pa. When our runs, of 46 080 particles, have these energies tells roughly how long
+Numbers of a run of the authors' public code on this bar (30 720 particles, dx 0.015 m) have been
+noted, but not its log: over 60 steps it took 2.5, 3.1 and 3.0 outer iterations a step for a middle
+of 1e5, 1e7 and 1e9 Pa. The lengths of its steps are not among them, but energies of its converged
+runs are: 0.849 J kinetic after 60 steps at 1e5 Pa, 1.264 J elastic after 40 steps at 1e9 Pa. When
+our runs, of 46 080 particles and the printed tolerance, have these energies tells roughly how long
 those steps were.
 """
 

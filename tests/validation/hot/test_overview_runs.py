@@ -1,9 +1,13 @@
 """Figure 15 over entire runs: steps lie over the run, all methods solve each, sizes are theirs."""
 
 import numpy as np
+import pytest
 
+from mpm_ref.scene import build
+from mpm_ref.simulate import simulate
 from validation.common.scenes import catalogue_scene, with_
 from validation.hot import overview, overview_runs
+from validation.hot import warm_states as states
 
 
 def poured(steps):
@@ -12,6 +16,18 @@ def poured(steps):
     body = scene.body[0]
     return with_(scene, end=steps * scene.longest,
                  body=(with_(body, sampling=with_(body.sampling, count=60)),))
+
+
+def test_measured_steps_end_where_a_block_enters():
+    problem = build(poured(12))
+    state, stepper = next(simulate(problem)).state, problem.stepper()
+    ends = []
+    while state.t < 0.3:
+        dt, before = states.next_step_length(problem, stepper, state), state.t
+        states.take_step(problem, stepper, state)
+        assert state.t - before == pytest.approx(dt, rel=1e-12)
+        ends.append(state.t)
+    assert min(abs(t - 0.24) for t in ends) < 1e-12
 
 
 def test_every_method_solves_steps_over_the_run(monkeypatch):

@@ -9,7 +9,7 @@ from mpm_ref.preflight import misplaced
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 from validation.common import targets
-from validation.common.scenes import SCENES, catalogue_scene
+from validation.common.scenes import SCENES, catalogue_scene, with_
 from validation.hot.settings import PARTS, UNCOUNTED
 from validation.hot.sizes import FILL, SIZES, Size, entered, sized
 from validation.hot.stretched_box import HIGH, LOW, VARIANTS, stretched
@@ -56,6 +56,8 @@ def test_sources_enter_block_by_block():
     grains, board = catalogue_scene("hot_boards").body[:2]
     assert [entered(grains, t) for t in (0.0, 0.119, 0.12, inf)] == [151, 151, 302, 35 * 151]
     assert entered(board, 0.0) == entered(board) == board.sampling.count
+    late = with_(grains, source=with_(grains.source, start=1.0))
+    assert [entered(late, t) for t in (0.9, 1.0)] == [0, 151]
     problem = build(catalogue_scene("hot_sauce"))
     assert problem.sources[0].particles == entered(catalogue_scene("hot_sauce").body[0])
 

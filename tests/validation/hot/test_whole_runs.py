@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from figures.common.splats import DARK, Balls, Camera, image, outward
-from figures.common.state_panels import SceneView, load_history, scene_cloud, states
+from figures.common.state_panels import (
+    SceneView,
+    is_shown,
+    load_history,
+    scene_cloud,
+    states,
+)
 from mpm_ref.scene import build
 from validation.common.registry import discover
 from validation.common.results import ProfileResults
@@ -184,6 +190,12 @@ def test_states_are_drawn_and_missing_ones_named(history, tmp_path):
                                               scalar=("stress", 1e-6, "stress [MPa]")))
     assert [ax.get_title() for ax in figure.axes[:2]] == ["t = 0.00 s", "t = 0.12 s"]
     assert len(figure.axes) == 3        # with the colour bar; of a short run, the last picture
+
+
+def test_a_prescribed_region_is_shown_while_it_holds_nodes():
+    source, = build(catalogue_scene("hot_sauce")).conditions.prescribed
+    assert 5.9 < source.until < 6.3
+    assert [is_shown(source, t) for t in (0.0, 5.9, 7.7)] == [True, True, False]
 
 
 def test_states_of_a_pour_are_drawn_with_what_is_there(poured, tmp_path):
