@@ -26,7 +26,7 @@ METHOD = "hot"
 ROWS = 500          # of the table, at most
 MOST = 20_000       # particles that are kept for pictures
 COLOURED = ("wheel",)       # scenes whose pictures show the stress
-PATIENCE = 900      # CPU seconds of a whole run, at most, unless it is of the printed size
+PATIENCE = 3600     # CPU seconds of a whole run, at most, unless it is of the printed size
 
 
 def scene_experiment(scene, seconds, quick=None):
@@ -42,7 +42,7 @@ def scene_experiment(scene, seconds, quick=None):
     def whole_run(run):
         """Run the scene and record the work of its steps."""
         end = run.choose(quick={"end": quick}, standard={}, paper={})
-        size, patience = run.choose(quick=("quick", PATIENCE), standard=("quick", PATIENCE),
+        size, patience = run.choose(quick=("quick", PATIENCE), standard=("standard", PATIENCE),
                                     paper=("paper", inf))
         record = sized(f"hot_{scene}", size, unstable="allow", **end)
         if run.profile == "paper" and scene in BODIES:
@@ -122,14 +122,14 @@ def record_cost(run, name, history):
                f"{cpu:.0f} s in all, {history.column('solve').sum() / cpu:.0%} of it in the solves")
 
 
-sauce = scene_experiment("sauce", 90)
-boxes = scene_experiment("boxes", 90, quick=0.05)
-donut = scene_experiment("donut", 120)
-wheel = scene_experiment("wheel", 20)
-twist = scene_experiment("twist", 120)
-faceless = scene_experiment("faceless", 10)
-boards = scene_experiment("boards", 110)
-armacat = scene_experiment("armacat", 30)
-chain = scene_experiment("chain", 240)
-aluminium = scene_experiment("aluminium", 20)
-stiffness = scene_experiment("stiffness", 10)
+sauce = scene_experiment("sauce", 900)
+boxes = scene_experiment("boxes", 700, quick=0.05)
+donut = scene_experiment("donut", 1200)
+wheel = scene_experiment("wheel", 150)
+twist = scene_experiment("twist", 1200)
+faceless = scene_experiment("faceless", 70)
+boards = scene_experiment("boards", 1100)
+armacat = scene_experiment("armacat", 260)
+chain = scene_experiment("chain", 2300)
+aluminium = scene_experiment("aluminium", 170)
+stiffness = scene_experiment("stiffness", 70)
