@@ -203,6 +203,28 @@ def hot_line(row):
 
 
 @app.command()
+def implicit_features(
+    steps: Annotated[int, typer.Option(help="of a block that hits a floor")] = 12,
+    threads: int = 1,
+    repeats: int = 5,
+    out: Path = Path("results/benchmarks/implicit_features.json"),
+):
+    """Measure the CPU time of an implicit step with friction, MLS, or a plastic potential."""
+    from mpm_ref.core.jit import set_threads
+
+    from .implicit_features import implicit_rows
+
+    set_threads(threads)
+    with threadpoolctl.threadpool_limits(threads):
+        rows = implicit_rows(steps, repeats)
+    for row in rows:
+        typer.echo(f"{row['variant']:52} {row['cpu_s']:8.4f} s  x {row['cpu_ratio']:.2f}  "
+                   f"{row['iterations']:.1f} iterations"
+                   + ("" if row["converged"] else ", not all solved"))
+    save(out, rows, threads, repeats)
+
+
+@app.command()
 def hot_runs(
     runs: Annotated[str, typer.Option(help="of hot_runs.RUNS, comma-separated; none: all")] = "",
     threads: int = 1,
