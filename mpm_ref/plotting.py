@@ -258,7 +258,7 @@ def _to_parts(parts, X, t):
     """
     nearest = np.full(len(X), FAR)
     for part in parts:
-        motion = part.motion if getattr(part, "follows", True) else part.motion.at_rest
+        motion = getattr(part, "region_motion", part.motion)
         pose = motion.pose(t, 1.0, X.shape[1])
         own = pose.origin + (X - pose.center) @ pose.R[0]       # R^T (x - center), row by row
         side = -1.0 if part.inside else 1.0

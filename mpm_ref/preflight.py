@@ -21,6 +21,7 @@ ON = 1e-6           # cells: a particle this near to a surface is on it, however
 REACH = 2.0         # particle spacings: radius of the ball in which material is measured
 CROWDED = 1.5       # of that ball; bodies that merely touch fill at most 1.3, also if random
 THIN = 2.0          # cells: others sink into a thinner body that they touch
+MOST_PLACES = 64    # of the blocks of a source that sways
 
 
 def misplaced(problem):
@@ -29,17 +30,20 @@ def misplaced(problem):
 
     The regions of `fixed`, whose nodes have a given motion, may hold particles. Two bodies overlap
     where they have half as much material again as there is room, which is at a depth of one or two
-    particle spacings; less is not detected. Thin is what is flat, not what is hollow.
+    particle spacings; less is not detected. Thin is what is flat, not what is hollow. Of a source
+    that sways, up to MOST_PLACES of its blocks are looked at, evenly over the run, in a scene as it
+    starts.
     """
     bodies = starting(problem)
-    return [*_in_solids(problem, bodies), *_in_each_other(bodies), *_thin(problem)]
+    return [*_in_solids(problem, bodies), *_in_each_other(bodies), *_swaying(problem, bodies),
+            *_thin(problem)]
 
 
 def starting(problem):
-    """Return the bodies of a problem as they start; of a source that starts later, its block."""
+    """Return the bodies of a problem as they start; of a source, its first block."""
     bodies = list(problem.bodies)
     for source in problem.sources:
-        bodies[source.body] = source.block
+        bodies[source.body] = source.entering(0, source.start)
     return bodies
 
 
@@ -146,6 +150,28 @@ def _volume(body):
 
 def _spacing(body):
     return _volume(body) ** (1.0 / body.particles.x.shape[1])
+
+
+# blocks that enter later
+
+def _swaying(problem, bodies):
+    """Yield the sentences about the first block after that of the start which a source that sways
+    lets into a solid, or into another body, as these stand at the start.
+    """
+    for source in problem.sources:
+        if source.sway is None:
+            continue
+        others = [body for k, body in enumerate(bodies) if k != source.body]
+        later = source.blocks - 1
+        for k in np.unique(np.linspace(1, later, min(later, MOST_PLACES)).astype(int)):
+            block = source.entering(k, source.time(k))
+            sentences = [*_in_solids(problem, [block])]
+            for other in others:
+                sentences += _in_each_other([block, other])
+            yield from (f"block {k} of a source, from t = {source.time(k):.3g} s on: {sentence}"
+                        for sentence in sentences)
+            if sentences:
+                break
 
 
 # thin bodies in contact

@@ -76,12 +76,13 @@ def start(problem, stepper):
     """Return the first `State` of a problem, with stress, energy account and stable time step.
 
     Raises ValueError if a body does not fit the scheme, `Unstable` for a state that is not sound,
-    `core.grid.OutOfRange` where no grid covers it, `TooLarge` for a dt past its bound.
+    `core.grid.OutOfRange` where no grid covers it or a source, `TooLarge` for a dt past its bound.
     """
     state = State(problem.bodies)
     stepper.start(filled(state.bodies))
     for source in problem.sources:
         stepper.start((source.entering(0, source.start),))
+        stepper.storage.box([source.extremes()])
     check(problem, state, 0.0)
     stepper.storage.cover([body.particles.x for body in filled(state.bodies)])
     state.account = account(problem, state.bodies)

@@ -7,12 +7,19 @@ gaps, since the block before has moved by its length. Adaptive steps end at t_k,
 blocks have the same sample, at rest but for v. Which blocks enter after a step is a function of the
 times before and after it alone, so that a resumed run has the same bits.
 
+A source may sway: block k is displaced by s_i = A_i sin(2 pi f_i t_k) along each axis i, as it
+enters and, with its constant velocity v, afterwards. The sway adds nothing to v. So a stream is a
+staircase of blocks, each shifted sideways from the one before by the difference of their s: it
+carries as much a second as one that stands still, and along v has no gaps unless s has a part
+along v, which parts blocks or lets them overlap. What is held (`hold` of a scene) is the place of
+the block that entered last.
+
 All particles of a source belong to one body. Its number of particles in a whole run is known before
 the run: block k has the numbers from k n to (k + 1) n - 1 of `Body.id`, n particles a block.
 """
 
 from dataclasses import dataclass
-from math import ceil, floor, inf
+from math import ceil, floor, inf, pi, sin
 
 import numpy as np
 
@@ -27,10 +34,64 @@ MOST = 50_000_000               # particles of a source in a run
 
 
 @dataclass(frozen=True)
+class SourceSway:
+    """The displacement of a source that sways: amplitude sin(2 pi frequency t) along each axis.
+
+    Raises ValueError for other than finite amplitudes, with a finite frequency >= 0 for each.
+    """
+
+    amplitude: tuple        # d numbers [m]
+    frequency: tuple        # d numbers [1/s]
+
+    def __post_init__(self):
+        a, f = np.asarray(self.amplitude, float), np.asarray(self.frequency, float)
+        if a.shape != f.shape or not (np.isfinite(a).all() and ((f >= 0.0) & (f < inf)).all()):
+            raise ValueError(f"a sway of amplitude {self.amplitude} and frequency "
+                             f"{self.frequency}: expected finite numbers, and for each amplitude a "
+                             "frequency >= 0")
+
+    def value(self, t):
+        """Return the displacement (d,) [m] at time t [s] of the run."""
+        return np.array([a * sin(2.0 * pi * f * t)
+                         for a, f in zip(self.amplitude, self.frequency, strict=True)])
+
+
+@dataclass(frozen=True)
+class EntryTimes:
+    """The times start + k period at which blocks enter."""
+
+    start: float            # of the first block [s]
+    period: float           # [s]
+    blocks: int             # in the whole run; infinite without end
+
+    def due(self, t):
+        """Return the number of blocks that have entered by time t [s]."""
+        passed = floor((t - self.start) / self.period + EVEN) + 1
+        return min(max(passed, 0), self.blocks)
+
+    def time(self, k):
+        """Return the time at which block k enters [s]; infinite after the last one."""
+        return self.start + k * self.period if k < self.blocks else inf
+
+
+@dataclass(frozen=True)
+class PlaceOfLastBlock:
+    """A schedule (see `core.motion`): the displacement of the block that entered last."""
+
+    sway: SourceSway
+    times: EntryTimes
+
+    def value(self, t):
+        """Return the displacement (d,) [m]; before the first block, that of the first block."""
+        return self.sway.value(self.times.time(max(self.times.due(t) - 1, 0)))
+
+
+@dataclass(frozen=True)
 class ParticleSource:
     """A block of particles that enters a run again and again, one block behind the other.
 
-    Raises ValueError for times, a velocity or a number of particles that make no stream.
+    Blocks enter with the given velocity, also where the source sways. Raises ValueError for times,
+    a velocity or a number of particles that make no stream.
     """
 
     body: int               # number of the body that grows
@@ -39,6 +100,7 @@ class ParticleSource:
     length: float           # of a block along the velocity [m]
     start: float            # time of the first block [s]
     blocks: int             # in the whole run
+    sway: SourceSway | None = None
 
     def __post_init__(self):
         speed = float(np.linalg.norm(self.velocity))
@@ -67,23 +129,47 @@ class ParticleSource:
         """Return the number of particles of the whole run."""
         return self.blocks * len(self.block.id)
 
+    @property
+    def times(self):
+        """Return the `EntryTimes` of its blocks."""
+        return EntryTimes(self.start, self.period, self.blocks)
+
     def due(self, t):
         """Return the number of blocks that have entered by time t [s]."""
-        passed = floor((t - self.start) / self.period + EVEN) + 1
-        return min(max(passed, 0), self.blocks)
+        return self.times.due(t)
 
     def time(self, k):
         """Return the time at which block k enters [s]; infinite after the last one."""
-        return self.start + k * self.period if k < self.blocks else inf
+        return self.times.time(k)
+
+    def place(self, k):
+        """Return the displacement (d,) [m] of block k from where it is sampled, as it enters."""
+        if self.sway is None:
+            return np.zeros_like(self.velocity)
+        return self.sway.value(self.time(k))
+
+    def extremes(self):
+        """Return the block's positions at both ends of its sway, (2 N, d) [m]: no block enters
+        outside of their bounding box.
+        """
+        x = self.block.particles.x
+        reach = 0.0 if self.sway is None else np.abs(self.sway.amplitude)
+        return np.concatenate((x - reach, x + reach)).astype(x.dtype)
 
     def all_particles(self):
-        """Return the body with all particles of the run, each where its block is sampled."""
+        """Return the body with all particles of the run, each where its block enters."""
         body = change_rows(self.block, lambda a: np.concatenate(self.blocks * [a]))
+        if self.sway is not None:
+            n = len(self.block.id)
+            for k in range(self.blocks):
+                body.particles.x[k * n:(k + 1) * n] += self.place(k)
         return body._replace(id=np.arange(self.particles))
 
     def entering(self, k, t):
         """Return block k as it enters at time t [s], with its stress."""
         moved = self.velocity * (t - self.time(k))
+        if self.sway is not None:
+            moved = moved + self.place(k)
         n = len(self.block.id)
         block = change_rows(self.block, np.copy)._replace(id=k * n + np.arange(n))
         block.particles.x[:] = self.block.particles.x + moved
@@ -131,7 +217,7 @@ def first_bodies(bodies, sources):
 
 def total_bodies(problem):
     """Return the bodies with as many particles as they have in the whole run, those that enter
-    later where their block is sampled; masses and volumes at rest are those of the run.
+    later where their block enters; masses and volumes at rest are those of the run.
     """
     bodies = list(problem.bodies)
     for source in problem.sources:

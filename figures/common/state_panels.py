@@ -179,7 +179,7 @@ def cloud(x, body, colour, spacing):
 def surface(part, where, colour):
     """Return balls on the surface of a collider or region; `where`: time, box and spacing."""
     t, box, fineness = where
-    motion = part.motion if getattr(part, "follows", True) else part.motion.at_rest
+    motion = getattr(part, "region_motion", part.motion)
     pose = motion.pose(t, 1.0, 3)
     X = np.stack(np.meshgrid(*(np.arange(a, b, fineness) for a, b in box.T), indexing="ij"),
                  axis=-1).reshape(-1, 3)

@@ -4,7 +4,7 @@ from ..common.state_panels import SceneView, scene_scale, states
 
 NEEDS = ["hot.scenes.sauce"]
 LOOK = SceneView((0, 1, 3, 12), ("#b5302a",), turn=155.0,
-                 low=(2.2, 2.97, 2.45), high=(3.7, 4.2, 3.6))
+                 low=(2.2, 2.97, 2.2), high=(3.7, 4.3, 3.6))
 
 
 def scale(results):

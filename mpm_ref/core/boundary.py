@@ -62,7 +62,9 @@ class Prescribed:
     """A region whose nodes move as told, whatever else they meet.
 
     The region goes along with the motion, unless `follows` is False: then it stays in place and
-    gives its nodes the velocity of the motion. `inside` takes the nodes outside the shape instead.
+    gives its nodes the velocity of the motion. Where it has a motion `place` of its own, it stands
+    for a step where that has it as the step begins. `inside` takes the nodes outside the shape
+    instead.
     It holds in steps that end after `since` and not after `until` [s].
     """
 
@@ -72,6 +74,7 @@ class Prescribed:
     follows: bool = True
     since: float = 0.0
     until: float = inf
+    place: Motion | None = None
 
     rule = PRESCRIBED
     friction = 0.0
@@ -81,13 +84,24 @@ class Prescribed:
             raise ValueError(f"since = {self.since}, until = {self.until}: expected times in s, "
                              "0 <= since < until")
 
+    @property
+    def region_motion(self):
+        """The motion of the region itself, whatever velocity its nodes have."""
+        if self.place is not None:
+            return self.place
+        return self.motion if self.follows else self.motion.at_rest
+
     def touch(self, nodes, t, dt):
         """The nodes it contains at time t; see `touch`."""
         d = nodes.m.ndim
         if not self.since < t - EVEN * dt <= self.until:
             nodes = selected(nodes, slice(0))
         pose = self.motion.pose(t, dt, d)
-        region = pose if self.follows else self.motion.at_rest.pose(t, dt, d)
+        region = pose
+        if self.place is not None:
+            region = self.place.pose(t - dt, dt, d)
+        elif not self.follows:
+            region = self.motion.at_rest.pose(t, dt, d)
         return touch(nodes, self.shape, self.inside, region, pose)
 
 

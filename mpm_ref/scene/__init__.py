@@ -60,7 +60,7 @@ from .records import (
     Velocity,
     Walls,
 )
-from .stream_records import Sink, Stream
+from .stream_records import Sink, Stream, Sway
 from .toml import canonical, digest, dumps, load, loads
 
 __all__ = [
@@ -109,6 +109,7 @@ __all__ = [
     "Sphere",
     "Steady",
     "Stream",
+    "Sway",
     "Torus",
     "Transformed",
     "Union",

@@ -5,7 +5,28 @@ from typing import Annotated
 from msgspec import Meta
 
 from ..shapes import Analytic
-from ..shapes.quantities import Length, Positive, Record
+from ..shapes.quantities import Length, NotNegative, Positive, Record, Vector
+
+Frequencies = Annotated[tuple[NotNegative, ...], Meta(min_length=2, max_length=3)]      # [1/s]
+
+
+class Sway(Record):
+    """amplitude sin(2 pi frequency t) along each axis, t the time of the run: by how much a source
+    is displaced.
+    """
+
+    amplitude: Vector                           # [m]
+    frequency: Frequencies                      # [1/s]
+
+    def __post_init__(self):
+        if len(self.frequency) != len(self.amplitude):
+            raise ValueError(f"frequency = {list(self.frequency)}: expected "
+                             f"{len(self.amplitude)} numbers, one for each of `amplitude`")
+        for a, f in zip(self.amplitude, self.frequency, strict=True):
+            if a != 0.0 and f == 0.0:
+                raise ValueError(f"amplitude = {list(self.amplitude)} with frequency = "
+                                 f"{list(self.frequency)}: expected a frequency > 0 wherever the "
+                                 "amplitude is not 0")
 
 
 class Stream(Record):
@@ -15,6 +36,7 @@ class Stream(Record):
     stop: Positive | None = None                # no block enters from then on [s]
     length: Length | None = None                # of a block along its velocity [m]
     hold: bool = True                           # nodes in the shape have that velocity meanwhile
+    sway: Sway | None = None                    # of the shape; none: it stands still
 
 
 class Sink(Record):

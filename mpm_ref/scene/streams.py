@@ -10,7 +10,14 @@ from ..core.motion import Motion, Steady
 from ..shapes import Analytic, level_set
 from ..shapes.inside import check_bounded, solid
 from ..simulate import last_step
-from ..streams import ParticleSink, ParticleSource, blocks_until
+from ..streams import (
+    EntryTimes,
+    ParticleSink,
+    ParticleSource,
+    PlaceOfLastBlock,
+    SourceSway,
+    blocks_until,
+)
 from .messages import SceneError, errors_at
 
 
@@ -52,7 +59,8 @@ def build_sources(scene, bodies):
             v, length, stop = stream_of(record)
             period = length / float(np.linalg.norm(v))
             blocks = blocks_until((record.source.start, period), stop, end)
-            found.append(ParticleSource(k, bodies[k], v, length, record.source.start, blocks))
+            found.append(ParticleSource(k, bodies[k], v, length, record.source.start, blocks,
+                                        sway_of(record)))
     return tuple(found)
 
 
@@ -70,10 +78,16 @@ def stream_of(record):
     return v, length, inf if stop is None else stop
 
 
+def sway_of(record):
+    """Return the `streams.SourceSway` of the source of a body's record; None where it stands."""
+    sway = record.source.sway
+    return None if sway is None else SourceSway(sway.amplitude, sway.frequency)
+
+
 def held_regions(scene):
     """Return the conditions of sources that hold what is in their shape: nodes there have the
-    velocity of the source until its last block has passed. Raises SceneError for a shape without
-    distance.
+    velocity of the source until its last block has passed. The region of a source that sways is
+    where the block is that entered last. Raises SceneError for a shape without distance.
     """
     regions = []
     for k, record in flowing(scene):
@@ -85,8 +99,23 @@ def held_regions(scene):
         with errors_at(f"body[{k}].source"):
             until, (v, *_) = time_of_leaving(record), stream_of(record)
             regions.append(Prescribed(level_set(record.shape), Motion(Steady(v)), follows=False,
-                                      since=record.source.start, until=until))
+                                      since=record.source.start, until=until,
+                                      place=region_place(record)))
     return tuple(regions)
+
+
+def region_place(record):
+    """Return the `core.motion.Motion` of the shape of a source that sways; None where it stands.
+
+    It jumps from block to block, so that each is held until it has left its shape.
+    """
+    sway = sway_of(record)
+    if sway is None:
+        return None
+    v, length, stop = stream_of(record)
+    period = length / float(np.linalg.norm(v))
+    blocks = inf if stop == inf else blocks_until((record.source.start, period), stop, inf)
+    return Motion(PlaceOfLastBlock(sway, EntryTimes(record.source.start, period, blocks)))
 
 
 def time_of_leaving(record):

@@ -51,6 +51,7 @@ def scene_hash(problem):
         *[(one.body, one.velocity.tolist(), one.length, one.start, one.blocks)
           for one in problem.sources],
         *[_in_full(one.shape) for one in problem.sinks],
+        *[(one.body, one.sway) for one in problem.sources if one.sway is not None],
     ))
     return hashlib.sha256(text.encode()).hexdigest()
 

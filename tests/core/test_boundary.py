@@ -124,6 +124,15 @@ def test_prescribed_region_that_follows_or_stays():
         assert np.count_nonzero(u) == 2
 
 
+def test_prescribed_region_stands_where_its_place_is_as_the_step_begins():
+    """A place that moves by two cells in 0.2 s, and a step of 0.1 s that ends then: one cell."""
+    slab, motion = box((-0.05, -1), (0.05, 1)), Motion(Steady((0.5, 0.0)))
+    region = Prescribed(slab, motion, place=Motion(Steady((1.0, 0.0))))
+    _, u, _ = applied(grid_of(np.zeros((4, 2, 2))), prescribed=(region,), t=0.2)
+    assert u[1, :, 0] == pytest.approx(0.5)
+    assert np.count_nonzero(u) == 2
+
+
 @pytest.mark.parametrize(("t", "holds"), [(0.1, False), (0.2, True), (0.3, True), (0.4, False)])
 def test_prescribed_region_holds_from_one_time_to_another(t, holds):
     slab = Prescribed(box((-0.05, -1), (0.05, 1)), Motion(Steady((1.0, 0.0))), follows=False,

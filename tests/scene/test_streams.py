@@ -60,6 +60,17 @@ def test_a_scene_is_written_and_read_back():
     assert canonical(scene) != canonical(loads(stream(2, "stop = 0.2")))
 
 
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_sway_is_written_and_read_back(d):
+    values = f"amplitude = {[0.1, 0.0, -0.3][:d]}, frequency = {[2.0, 0.0, 1.5][:d]}"
+    scene = loads(stream(d, f"stop = 0.2, sway = {{ {values} }}"))
+    assert loads(dumps(scene)) == scene
+    assert canonical(scene) != canonical(loads(stream(d, "stop = 0.2")))
+    (source,) = build(scene).sources
+    assert source.sway.amplitude == scene.body[0].source.sway.amplitude == (0.1, 0.0, -0.3)[:d]
+    assert source.sway.frequency == (2.0, 0.0, 1.5)[:d]
+
+
 def test_the_length_of_a_shape_is_how_far_it_moves_until_it_has_left():
     box = solid(Box(lower=(0.0, 0.0), upper=(0.4, 0.1)))
     assert length_along(box, np.array([0.0, -3.0])) == pytest.approx(0.1)
@@ -93,6 +104,22 @@ PARTICLES = '{ file = "x.npz" }'
     ("\nshape = ", f"\nparticles = {PARTICLES}\n#", "`source` is for a body with a shape"),
     ("source = {  }", '[[sink]]\nname = "no shape"', "sink[0].shape: this key is missing"),
     ("source = {  }", "source = { length = 1e-9 }", "particles in all"),
+    ("source = {  }", "source = { sway = { amplitude = [0.1, 0.0] } }",
+     "source.sway.frequency: this key is missing"),
+    ("source = {  }", "source = { sway = { frequency = [1.0, 1.0] } }",
+     "source.sway.amplitude: this key is missing"),
+    ("source = {  }", "source = { sway = { amplitude = [0.1, 0.0], frequency = [1.0, -1.0] } }",
+     "source.sway.frequency[1] = -1.0: expected a number >= 0"),
+    ("source = {  }", "source = { sway = { amplitude = [nan, 0.0], frequency = [1.0, 1.0] } }",
+     "source.sway.amplitude[0] = nan: expected a finite number"),
+    ("source = {  }", "source = { sway = { amplitude = [0.1, 0.0, 0.0], frequency = [1.0, 1.0] } }",
+     "frequency = [1.0, 1.0]: expected 3 numbers, one for each of `amplitude`"),
+    ("source = {  }", "source = { sway = { amplitude = [1, 0, 0], frequency = [1, 1, 1] } }",
+     "source.sway.amplitude = [1.0, 0.0, 0.0]: expected 2 numbers (dim = 2)"),
+    ("source = {  }", "source = { sway = { amplitude = [0.1, 0.2], frequency = [1.0, 0.0] } }",
+     "expected a frequency > 0 wherever the amplitude is not 0"),
+    ("source = {  }", "sway = { amplitude = [0.1, 0.2], frequency = [1.0, 1.0] }",
+     "body[0].sway: unknown key"),
 ])
 def test_what_makes_no_stream_is_refused(old, new, message):
     assert old in stream()

@@ -14,6 +14,7 @@ from mpm_ref.store.vtkhdf import export_grid, export_particles
 
 CLOCKS = {"explicit": "end = 0.4\ninterval = 0.04",
           "implicit": 'integrator = "hot"\nlongest = 0.02\nend = 0.4\ninterval = 0.04'}
+SWAY = "sway = {{ amplitude = {}, frequency = {} }}"
 
 
 def jet(d=2, clock="explicit", source=""):
@@ -63,6 +64,19 @@ def test_pictures_show_the_particles_that_are_there(results):
     for k in (0, 5, len(results) - 1):
         dots = particles(draw(results, k, "body").axes[0])
         assert len(dots.get_offsets()) == len(dots.get_array()) == results.present("jet", k).sum()
+
+
+def test_a_source_that_sways_is_drawn_where_its_last_block_entered(tmp_path):
+    """Frames lie between the entries, at t = 0, 0.1, 0.2 s."""
+    source = SWAY.format([0.3, 0.0], [1.0, 0.0])
+    run(problem(2, source, "end = 0.25\ninterval = 0.05"), tmp_path / "run.h5")
+    with Results(tmp_path / "run.h5") as results:
+        for frame, entry in ((1, 0.0), (3, 0.1), (5, 0.2)):
+            drawn = draw(results, frame).axes[0].collections
+            (line,) = [one.get_paths()[0].vertices for one in drawn
+                       if hasattr(one, "filled") and not one.filled]
+            x = 0.3 * np.sin(2.0 * np.pi * entry) + np.array([0.5, 0.6])
+            assert [line[:, 0].min(), line[:, 0].max()] == pytest.approx(x, abs=2e-3)
 
 
 def test_exports_have_the_particles_that_are_there(results, tmp_path):
@@ -123,15 +137,17 @@ def test_an_empty_frame_is_stored_drawn_and_exported(tmp_path):
         assert not h5["VTKHDF/PointData/density"][-1].any()
 
 
+@pytest.mark.parametrize("source", ["", SWAY])
 @pytest.mark.parametrize("clock", CLOCKS)
 @pytest.mark.parametrize("d", [2, 3])
-def test_a_run_in_parts_is_the_run(tmp_path, d, clock):
+def test_a_run_in_parts_is_the_run(tmp_path, d, clock, source):
     """Stopped before, between and after entries and removals: the same bits in all files."""
-    whole = run(jet(d, clock), tmp_path / "whole.h5")
+    source = source.format(*(str(a[:d]) for a in ([0.3, 0.0, -0.2], [1.0, 0.0, 1.5])))
+    whole = run(jet(d, clock, source), tmp_path / "whole.h5")
     out, step = tmp_path / "parts.h5", whole.state.step
     for stop in range(1, step, max(step // 9, 1)):
-        run(jet(d, clock), out, Options(steps=stop, resume=stop > 1))
-    rest = run(jet(d, clock), out, Options(resume=True))
+        run(jet(d, clock, source), out, Options(steps=stop, resume=stop > 1))
+    rest = run(jet(d, clock, source), out, Options(resume=True))
     assert digest(rest.state) == digest(whole.state)
     with Results(tmp_path / "whole.h5") as a, Results(out) as b:
         assert np.array_equal(a.step, b.step)

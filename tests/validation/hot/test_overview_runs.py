@@ -37,5 +37,5 @@ def test_every_method_solves_steps_over_the_run(monkeypatch):
     assert [(row.method, row.step) for row in rows] == [
         (method, k) for k in range(3) for method in ("hot", "pn-pcg")]
     assert np.all(np.diff([row.t for row in rows[::2]]) > 0.1)
-    assert (hot.total, hot.steps, hot.particles) == (1.0, 3, 120)       # of the last of them
+    assert (hot.total, hot.steps, hot.particles) == (1.0, 3, 240)       # of the last of them
     assert pcg.total > 0.0

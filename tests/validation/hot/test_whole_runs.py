@@ -12,6 +12,7 @@ from figures.common.state_panels import (
     load_history,
     scene_cloud,
     states,
+    surface,
 )
 from mpm_ref.scene import build
 from validation.common.registry import discover
@@ -65,13 +66,13 @@ def poured():
 
 def test_particles_that_enter_are_in_a_history_from_then_on(poured):
     there = np.isfinite(poured.x).all(axis=2)
-    assert there.shape == (13, 180)
-    assert len(poured.body) == 180
+    assert there.shape == (13, 300)
+    assert len(poured.body) == 300
     assert there[0].sum() == 60
     assert there[-1].all()
     assert np.all(there[1:] >= there[:-1])
     np.testing.assert_array_equal(np.isfinite(poured.speed), there)
-    assert poured.facts["mass"][1] == pytest.approx(3.0 * poured.facts["mass"][0])
+    assert poured.facts["mass"][1] == pytest.approx(5.0 * poured.facts["mass"][0])
     assert poured.column("gap").max() < 1e-13       # what enters is no part of the step's balance
 
 
@@ -79,7 +80,7 @@ def test_poured_particles_are_kept_by_their_last_places(poured, monkeypatch):
     monkeypatch.setattr(whole_runs, "MOST", 50)
     shown = whole_runs.shown_particles(poured.x)
     assert len(set(shown)) == 50
-    assert shown.max() >= 120
+    assert shown.max() >= 240
     early = poured.x[:5]
     assert np.isfinite(early[-1, whole_runs.shown_particles(early)]).all()
 
@@ -198,12 +199,25 @@ def test_a_prescribed_region_is_shown_while_it_holds_nodes():
     assert [is_shown(source, t) for t in (0.0, 5.9, 7.7)] == [True, True, False]
 
 
+@pytest.mark.parametrize("t", [0.0, 0.3, 5.9])
+def test_a_region_that_sways_is_drawn_where_it_is(t):
+    """The shape of the sauce's source, where the block is that entered last."""
+    source, = build(catalogue_scene("hot_sauce")).conditions.prescribed
+    due = 0.12 * np.floor(t / 0.12)
+    where = [3.0 - 0.4 * np.sin(np.radians(55.0) * due), 4.18,
+             2.857 + 0.5 * np.sin(np.radians(120.0) * due)]
+    box = np.array([[2.4, 4.1, 2.1], [3.6, 4.3, 3.6]])
+    balls = surface(source, (t, box, 0.015), "#000000")
+    middle = 0.5 * (balls.x.min(axis=0) + balls.x.max(axis=0))
+    assert middle == pytest.approx(where, abs=0.01)
+
+
 def test_states_of_a_pour_are_drawn_with_what_is_there(poured, tmp_path):
     results = ProfileResults(tmp_path)
     run = SimpleNamespace(folder=tmp_path, experiment=SimpleNamespace(id="hot.scenes.sauce"))
     whole_runs.keep_states(run, poured, stress=True)
     kept = load_history(results, "sauce")
-    assert len(scene_cloud(kept, 0, np.ones((180, 3))).x) == 60
+    assert len(scene_cloud(kept, 0, np.ones((300, 3))).x) == 60
     figure = states(results, "sauce", SceneView((0, 12), ("viridis",),
                                             scalar=("stress", 1e-6, "stress [MPa]")))
     assert len(figure.axes) == 3
