@@ -14,7 +14,13 @@ from tests.nclaw.test_invariants import near_rest, turns
 
 torch = pytest.importorskip("torch")
 
-from mpm_ref.materials.learned.response import Correction, Stress, SymmetricStress  # noqa: E402
+from mpm_ref.materials.learned.response import (  # noqa: E402
+    Correction,
+    PlainCorrection,
+    PlainStress,
+    Stress,
+    SymmetricStress,
+)
 from mpm_ref.nclaw.batched_step import make_world  # noqa: E402
 from mpm_ref.nclaw.train.autograd import Invariants  # noqa: E402
 from mpm_ref.nclaw.train.fit import TrajectorySession  # noqa: E402
@@ -30,6 +36,7 @@ from mpm_ref.nclaw.train.recipe import (  # noqa: E402
     TeacherForcing,
 )
 from mpm_ref.nclaw.train.rollout import LawPair, segment_errors  # noqa: E402
+from mpm_ref.nclaw.train.train import continued_laws, drawn_laws, learned_laws  # noqa: E402
 from mpm_ref.scene import build  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
 from validation.nclaw.environments import environment, trajectory  # noqa: E402
@@ -231,6 +238,37 @@ def test_what_would_become_of_a_segment_after_its_end_does_not_matter(run):
         assert (a - b).norm() < 1e-5 * b.norm()
 
 
+def test_a_training_goes_on_from_stored_laws():
+    """With their weights to the bit, in the precision of networks; of the paper's laws alone."""
+    laws = neural_laws(3, *STIFF)
+    resumed = continued_laws(learned_laws(laws, {}))
+    for a, b in zip(parameters(laws), parameters(resumed), strict=True):
+        assert torch.equal(a, b)
+    assert [law.kind for law in resumed] == [*STIFF]
+    other = learned_laws(drawn_laws("no rotation", 0, PlainStress(1e5), PlainCorrection(0.1)), {})
+    with pytest.raises(ValueError, match="expected those of the method 'ours'"):
+        continued_laws(other)
+
+
+@pytest.mark.parametrize("every", [2, 3, STEPS])
+def test_states_between_are_computed_anew(run, every):
+    """The loss is the same to the bit, gradients to round-off, whatever states are kept."""
+    found = {}
+    for keep_every in (1, every):
+        laws = neural_laws(0, *STIFF)
+        errors = segment_errors(laws, *run, [0, 2], [2, STEPS],
+                                Recipe(keep_every=keep_every, velocity=1e-4))
+        errors.loss.backward()
+        found[keep_every] = errors, [a.grad for a in parameters(laws)]
+        assert not errors.positions.requires_grad
+    (all_kept, gradients_), (few_kept, others) = found[1], found[every]
+    assert all_kept.loss.item() == few_kept.loss.item() > 0.0
+    assert all_kept.positions.item() == few_kept.positions.item()
+    for a, b in zip(gradients_, others, strict=True):
+        assert a.norm() > 0.0
+        assert (a - b).norm() < 1e-6 * a.norm()
+
+
 def test_errors_are_means_over_particles_and_axes(run):
     world, observed = run
     moved = observed._replace(x=observed.x + torch.tensor([3e-3, 0.0, 0.0]))
@@ -245,7 +283,8 @@ def test_errors_of_velocities_count_as_told(run):
     world, observed = run
     moved = observed._replace(v=observed.v + torch.tensor([0.0, 0.3, 0.0]))
     slower = observed._replace(v=torch.cat([observed.v[:1], moved.v[1:]]))
-    found = segment_errors(LawPair(jelly, lambda F: F), world, slower, [0], [4], velocity=1e-4)
+    found = segment_errors(LawPair(jelly, lambda F: F), world, slower, [0], [4],
+                           Recipe(velocity=1e-4))
     assert found.loss.item() == pytest.approx(4 * 1e-4 * 0.03, rel=1e-9)
     assert found.positions < 1e-26
 

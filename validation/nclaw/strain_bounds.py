@@ -29,6 +29,7 @@ def bounds(net, laws):
     """Return the bounds of the strains in the training of a `LawNet`'s laws."""
     observed, problem = trajectory(net.environment), build(environment(net.environment))
     steps = len(observed.x) - 1
-    cuts = () if net.method == LABELED else segment_cuts(Recipe(epochs=net.epochs), steps)
+    recipe = Recipe(epochs=net.epochs, first=net.first, last=net.last)
+    cuts = () if net.method == LABELED else segment_cuts(recipe, steps)
     with threads_for(problem.bodies):
         return training_bounds(problem, observed, body_maker(laws), cuts)

@@ -37,10 +37,13 @@ class LawNet(NamedTuple):
     elastic_rate: float = 1.0
     plastic_rate: float = 0.1
     velocity: float = 0.0           # weight of velocities in the loss [s^2]
+    first: int = 25                 # horizon of the teacher [steps]
+    last: int = 200
+    start: str = ""                 # name of the weights from which it goes on; "": drawn
 
 
 # Part of the identity where they are not as by default.
-LATER = ("method", "elastic_rate", "plastic_rate", "velocity")
+LATER = ("method", "elastic_rate", "plastic_rate", "velocity", "first", "last", "start")
 TRUE_LAWS = {   # environment -> its law and flow; fluids keep F = J^(1/3) I
     "jelly": ("FixedCorotated", "NoFlow"), "sand": ("Hencky", "DruckerPrager"),
     "plasticine": ("Hencky", "VonMises"), "water": ("Fluid", "FluidProjection")}

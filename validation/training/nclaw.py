@@ -23,19 +23,26 @@ from mpm_ref.scene import build
 from ..nclaw import bundle
 from ..nclaw.dough import DoughNet, doughs
 from ..nclaw.environments import environment, trajectory
+from ..nclaw.longer_horizons import longer_nets
 from ..nclaw.simulators import GraphNet, framed_run, scenes_of
 from ..nclaw.small_trainings import Small, small_nets
 from ..nclaw.strain_bounds import bounds
-from ..nclaw.trained_laws import FOLDER, diverged_path, identity, nets, store_diverged
+from ..nclaw.trained_laws import FOLDER, diverged_path, identity, nets, store_diverged, trained
 from .common import CHECKPOINTS, Checkpoints, Folder, Names, Threads, origin, times, train_all
 from .dough import filmed_laws
 from .small import bundled
 
+LAW_OPTIONS = ("epochs", "elastic_rate", "plastic_rate", "reading", "seed", "velocity", "first",
+               "last")
+KEEP_ALL, KEEP_EVERY = 200, 25      # longest segments of which all states are kept, and how many of
+                                    # longer ones [steps]
 GRAPH_OPTIONS = ("steps", "width", "batch", "noise", "first_rate", "last_rate", "seed")
 
 
 def untrained_laws(net):
-    """Return the `Laws` of a `LawNet` before training."""
+    """Return the `Laws` of a `LawNet` before training, or those from which it goes on."""
+    if net.start:
+        return train.continued_laws(trained(net.start))
     kinds = () if net.method == SYS_ID else (
         KINDS[net.elastic](), KINDS[net.plastic]())
     material = environment(net.environment).body[0].material
@@ -48,13 +55,17 @@ def train_net(net, recipe, laws, checkpoint, show):
     return train.train_laws(net.method, recipe, laws, run, checkpoint, show)
 
 
-def trained_laws(name, checkpoints, threads):
-    """Return the trained `LearnedLaws` of a name, with how they were made; of a training that
-    diverges, plain values alone.
+def recipe_of(net):
+    """Return the `Recipe` of a `LawNet`; of long segments few states are kept."""
+    keep_every = KEEP_EVERY if net.last > KEEP_ALL else 1
+    return Recipe(keep_every=keep_every, **{name: getattr(net, name) for name in LAW_OPTIONS})
+
+
+def trained_laws(name, net, checkpoints, threads):
+    """Return the trained `LearnedLaws` of a name and its `LawNet`, with how they were made; of a
+    training that diverges, plain values alone.
     """
-    net, path = nets()[name], checkpoints / f"{name}.pt"
-    recipe = Recipe(epochs=net.epochs, elastic_rate=net.elastic_rate, reading=net.reading,
-                    plastic_rate=net.plastic_rate, seed=net.seed, velocity=net.velocity)
+    path, recipe = checkpoints / f"{name}.pt", recipe_of(net)
     laws, errors, steps = untrained_laws(net), [], environment(net.environment).steps
     about = {**identity(net), "recipe": asdict(recipe), "threads": threads, **origin("nclaw", name)}
     with tqdm(total=recipe.epochs, desc=name) as bar:
@@ -69,7 +80,7 @@ def trained_laws(name, checkpoints, threads):
         except train.Diverged as fault:
             if path.exists() and not errors:    # continued from there: earlier errors are unknown
                 path.unlink()
-                return trained_laws(name, checkpoints, threads)
+                return trained_laws(name, net, checkpoints, threads)
             return {**about, "errors": errors, "stopped": str(fault)}
     about |= {**times(done.meter), **done.errors}
     learned = train.learned_laws(laws, about)
@@ -122,9 +133,9 @@ def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints 
         elif isinstance(net, DoughNet):
             write(path, filmed_laws(name, net, checkpoint, threads))
         else:
-            write(path, trained_laws(name, checkpoints, threads))
+            write(path, trained_laws(name, net, checkpoints, threads))
 
-    all_nets = {**nets(), **small_nets(), **doughs()}
+    all_nets = {**nets(), **longer_nets(), **small_nets(), **doughs()}
     train_all(names, all_nets, (folder, checkpoints), threads, make)
 
 

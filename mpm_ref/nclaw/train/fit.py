@@ -49,10 +49,11 @@ class TrajectorySession(TrainingSession):
 
     @property
     def description(self):
-        """Return the settings, what is trained and on what, as one line of text; without the size
-        of a batch, with which only time and round-off change.
+        """Return the settings, what is trained and on what, as one line of text; without those with
+        which only time, memory and round-off change.
         """
-        recipe = {name: value for name, value in asdict(self.recipe).items() if name != "batch"}
+        recipe = {name: value for name, value in asdict(self.recipe).items()
+                  if name not in ("batch", "keep_every")}
         if self.recipe.velocity:        # an error without a name has velocities in it
             recipe["errors_of"] = self.errors_of
         return json.dumps({"format": FORMAT, **recipe, "laws": [*map(describe, self.laws)],
@@ -86,7 +87,7 @@ class TrajectorySession(TrainingSession):
         """
         try:
             errors = segment_errors(self.laws, self.world, self.observed, cuts[:-1], cuts[1:],
-                                    self.recipe.velocity)
+                                    self.recipe)
         except ValueError as fault:
             raise Diverged(f"epoch {self.number}, steps {cuts[0]} to {cuts[-1]}: {fault} {ADVICE}"
                            ) from None

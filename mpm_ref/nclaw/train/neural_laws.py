@@ -77,6 +77,13 @@ def layers_of(net):
     return layers
 
 
+def put_layers(net, layers):
+    """Write layers, as those of `layers_of`, into a network without biases."""
+    with torch.no_grad():
+        for layer, (W, _) in zip(net.layers, layers, strict=True):
+            layer.weight.copy_(torch.from_numpy(W.T))
+
+
 class NeuralLawModule(LawModule):
     """F (n, d, d) -> answers (n, d, d) of a kind of `response` (NCLAW-alg4)."""
 
@@ -92,6 +99,10 @@ class NeuralLawModule(LawModule):
     def weights(self):
         """Return the `LawWeights` of the law."""
         return LawWeights(tuple(layers_of(self.net)), self.kind)
+
+    def resume(self, weights):
+        """Take over the layers of `LawWeights` of the same kind and sizes."""
+        put_layers(self.net, weights.layers)
 
 
 def neural_laws(seed, elastic, plastic, dim=3):

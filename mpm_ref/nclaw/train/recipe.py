@@ -44,9 +44,11 @@ class Recipe:
     loss of the authors' "release" is the sum over steps of mean squared errors [m^2] times `scale`
     times segments over steps: not printed, and part of the recipe, since gradients are small beside
     the 1e-8 that Adam adds to their size. The "printed" one is the mean over steps, in m^2.
-    `batch` segments run at once, which affects only time and round-off. `seed` is that
-    of the laws' start, and of the order of pairs (see `labeled`). `velocity` [s^2] weighs squared
-    errors of velocities beside those of positions (NCLAW-aux, printed without its value).
+    `batch` segments run at once, which affects only time and round-off. The backward sweep keeps
+    every `keep_every`-th of their states and computes those between anew, which affects memory,
+    time and round-off. `seed` is that of the laws' start, and of the order of pairs (see
+    `labeled`). `velocity` [s^2] weighs squared errors of velocities beside those of positions
+    (NCLAW-aux, printed without its value).
     """
 
     epochs: int = 300
@@ -59,10 +61,11 @@ class Recipe:
     scale: float = 1e4
     seed: int = 0
     batch: int = 8
+    keep_every: int = 1         # [steps]
     velocity: float = 0.0
 
     def __post_init__(self):
-        for name in ("epochs", "first", "last", "batch"):
+        for name in ("epochs", "first", "last", "batch", "keep_every"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected at least 1")
         for name in ("elastic_rate", "plastic_rate", "clip", "scale"):

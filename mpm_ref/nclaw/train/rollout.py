@@ -5,12 +5,17 @@
 Segments are independent: each restarts from an observed state.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import torch
+from torch.utils.checkpoint import checkpoint
 
 from ..batched_step import make_nodes
 from .autograd import Advance
+from .recipe import Recipe
+
+DEFAULT = Recipe()
 
 
 class LawPair(NamedTuple):
@@ -39,22 +44,40 @@ class SegmentErrors(NamedTuple):
     positions: torch.Tensor     # its part that is of positions, without a gradient [m^2]
 
 
-def segment_errors(laws, world, observed, starts, ends, velocity=0.0):
+def segment_errors(laws, world, observed, starts, ends, recipe=DEFAULT):
     """Return the `SegmentErrors`: mean squared errors of positions, over particles and axes, summed
     over the steps of segments from time levels `starts` to later ones, `ends`.
 
     Segments that have ended go no further. In the loss the errors of velocities are added, times
-    `velocity` [s^2].
+    the recipe's `velocity` [s^2]. Of the states the backward sweep keeps every `keep_every`-th.
     """
-    levels, last, total, positions = torch.tensor(starts), torch.tensor(ends), 0.0, 0.0
+    levels, last = torch.tensor(starts), torch.tensor(ends)
     state, nodes = observed.states(levels), make_nodes(world, len(starts))
+    anew = recipe.keep_every > 1
+    positions = torch.zeros((), dtype=torch.float64)
+    total = torch.zeros((), dtype=torch.float64, requires_grad=anew)    # `checkpoint` needs one
     while len(levels):
-        state, levels = step(laws, world, state, nodes), levels + 1
-        off = observed.squared_error("x", state[0], levels)
-        total, positions = total + off, positions + off.detach()
-        if velocity:
-            total = total + velocity * observed.squared_error("v", state[1], levels)
+        count = int((last - levels).min())
+        count = min(count, recipe.keep_every) if anew else count
+        part = partial(run_part, (laws, world, observed, recipe.velocity), nodes, levels, count)
+        total, positions, *state = (checkpoint(part, total, positions, *state, use_reentrant=True)
+                                    if anew else part(total, positions, *state))
+        positions, levels = positions.detach(), levels + count
         under_way = levels < last
         if not under_way.all():
             levels, last, *state = (a[under_way] for a in (levels, last, *state))
     return SegmentErrors(total, positions)
+
+
+def run_part(terms, nodes, levels, count, total, positions, *state):
+    """Advance a state at time levels by `count` steps; return both sums, with the errors after each
+    step added, and the state. terms: laws, world, observation and weight of velocities [s^2].
+    """
+    laws, world, observed, velocity = terms
+    for k in range(1, count + 1):
+        state = step(laws, world, state, nodes)
+        off = observed.squared_error("x", state[0], levels + k)
+        total, positions = total + off, positions + off.detach()
+        if velocity:
+            total = total + velocity * observed.squared_error("v", state[1], levels + k)
+    return total, positions, *state

@@ -35,8 +35,8 @@ OF_STRETCHES = {StretchStress: StretchLawModule, ReleasedStretchStress: Released
 
 IDENTIFIED = "friction_angle", "tau_y", "sigma_y"    # constants of flows that "sys-id" learns
 
-__all__ = ["Diverged", "drawn_laws", "initial_laws", "learned_laws", "train_laws", "use_threads",
-           "version"]
+__all__ = ["Diverged", "continued_laws", "drawn_laws", "initial_laws", "learned_laws",
+           "train_laws", "use_threads", "version"]
 
 
 def stretch_law(kind):
@@ -60,6 +60,19 @@ def drawn_laws(method, seed, elastic, plastic):
     torch.manual_seed(seed)
     return LawPair(*(make(kind) for make, kind in zip(METHODS[method], (elastic, plastic),
                                                       strict=True)))
+
+
+def continued_laws(learned):
+    """Return the `LawPair` of "ours" with the weights of `LearnedLaws` of that method, in single
+    precision. Raises ValueError for laws of another method.
+    """
+    laws = drawn_laws("ours", 0, learned.elastic.kind, learned.plastic.kind)
+    for law, own in zip(laws, (learned.elastic, learned.plastic), strict=True):
+        if [W.shape for W, _ in own.layers] != [W.shape for W, _ in law.weights().layers]:
+            raise ValueError(f"laws with layers {[W.shape for W, _ in own.layers]}: expected those "
+                             f"of the method 'ours', {[W.shape for W, _ in law.weights().layers]}")
+        law.resume(own)
+    return laws
 
 
 def initial_laws(method, seed, kinds, material):
