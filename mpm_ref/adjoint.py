@@ -10,7 +10,7 @@ runs of many steps, and is what one usually wants.
 
 import numpy as np
 
-from .core.adjoint import corotated, strain
+from .core.adjoint import corotated, full, strain
 from .core.adjoint import deform as deform_adjoint
 from .core.adjoint.boundary import solve_adjoint
 from .core.adjoint.deform import DeformBars, DeformStep
@@ -20,12 +20,13 @@ from .core.adjoint.transfer import Exchange, g2p_adjoint, p2g_adjoint, velocity_
 from .core.boundary import solve
 from .core.grid import GridBox, Storage, update
 from .core.jit import CHUNKS
-from .core.law import kirchhoff_vjp, project_vjp
+from .core.law import kirchhoff_bar, kirchhoff_vjp, project_vjp, returned_bar
 from .core.order import slabs_of
 from .core.state import NONE
 from .core.surface import AT_NODES
 from .explicit import damp, scatter
 from .materials import NoFlow
+from .materials.learned.guard import is_guarded
 
 
 class StepAdjoint:
@@ -131,10 +132,21 @@ def zero_sums(body):
 
 def require_adjoint(body):
     """Raise ValueError unless a body's law and flow have an adjoint."""
-    for part, known in ((body.law, kirchhoff_vjp.methods), (body.flow, project_vjp.methods)):
+    learned = is_learned(body)
+    laws = kirchhoff_bar.methods if learned else kirchhoff_vjp.methods
+    flows = {**returned_bar.methods, NoFlow: None} if learned else project_vjp.methods
+    for part, known in ((body.law, laws), (body.flow, flows)):
         if type(part) not in known:
             raise ValueError(f"body {body.name!r}: {type(part).__name__} has no adjoint here; "
                              f"expected one of {', '.join(sorted(c.__name__ for c in known))}")
+        if is_guarded(part):
+            raise ValueError(f"body {body.name!r}: {type(part).__name__} cuts its strains to a "
+                             "box, which has no adjoint; expected learned laws without a guard")
+
+
+def is_learned(body):
+    """Return whether a body's law is a network of F, whose adjoint is that of the whole F."""
+    return type(body.law) in kirchhoff_bar.methods
 
 
 def deform_body_adjoint(body, L, bar, parts, dt, one_gradient=False):
@@ -155,6 +167,8 @@ def _driver(body):
     """Return the loop over particles by which `deform_body_adjoint` differentiates a body."""
     if body.particles.F.ndim == 1:
         return deform_adjoint.fluid
+    if is_learned(body):
+        return full.elastic if isinstance(body.flow, NoFlow) else full.plastic
     if not isinstance(body.flow, NoFlow):
         return deform_adjoint.plastic
     for by_blocks in (corotated, strain):
@@ -176,6 +190,8 @@ def initial_stress_adjoint(body, bar, parts):
     q, bars = body.particles, _of_deformation(bar)
     if q.F.ndim == 1:
         deform_adjoint.initial_pressure(q.F, bars, body.law, parts)
+    elif is_learned(body):
+        full.initial_stress(q.F, bars, body.law)
     else:
         deform_adjoint.initial_stress(q.F, q.y, bars, body.law, body.flow, parts)
 

@@ -18,6 +18,7 @@ from .adjoint import (
     StepAdjoint,
     clip_adjoint,
     initial_stress_adjoint,
+    is_learned,
     require_adjoint,
     zero_bars,
     zero_sums,
@@ -58,8 +59,8 @@ class BodyGradient(NamedTuple):
     m: np.ndarray       # (N,)
     V0: np.ndarray      # (N,)
     b: np.ndarray       # (N, d), or (0,) where not carried
-    law: tuple          # the law's record, holding gradients
-    flow: tuple         # the flow's record, holding gradients
+    law: tuple | None   # the law's record, holding gradients; None of a learned law
+    flow: tuple | None  # the flow's record, holding gradients; None beside a learned law
 
 
 class Gradient(NamedTuple):
@@ -246,7 +247,8 @@ def _started_twin(body):
     twin = _twin(body)
     initial_stress(twin)
     tau = twin.particles.tau
-    size = sum(map(abs, body.law)) + abs(tau).max(initial=0.0)
+    moduli = body.law.unit if is_learned(body) else sum(map(abs, body.law))
+    size = moduli + abs(tau).max(initial=0.0)
     if not abs(body.particles.tau - tau).max(initial=0.0) <= ROUND_OFF * size:
         raise ValueError(f"body {body.name!r}: its stress tau is not that of its F: call "
                          "Stepper.start with the bodies before their tape begins")
@@ -272,6 +274,8 @@ def _add(bars, seeds):
 
 
 def _result(body, bar, parts):
+    if is_learned(body):
+        return BodyGradient(bar.x, bar.v, bar.C, bar.F, bar.y, bar.m, bar.V0, bar.b, None, None)
     total, n = parts.sum(axis=0).tolist(), len(body.law)
     of_law, of_flow = type(body.law)(*total[:n]), type(body.flow)(*total[n:])
     if isinstance(body.flow, Hardening | Softening):

@@ -36,6 +36,8 @@ intact = by_type("intact")                # (y, flow) -> 1.0, or 0.0 where the m
 
 # Adjoint: `X_bar` is the gradient of a scalar loss by X. See `core.adjoint.deform`.
 kirchhoff_vjp = by_type("kirchhoff_vjp")  # (s, T, law) -> U^T F_bar V, where T = U^T tau_bar U
+kirchhoff_bar = by_type("kirchhoff_bar")  # (F, tau_bar, law) -> F_bar of a law of the whole F
+returned_bar = by_type("returned_bar")    # (F, F_new_bar, flow) -> F_bar of `returned`
 corotated = by_type("corotated")          # (J, law) -> a, p, dp/dJ of tau = a (F F^T - V) + p(J) I
 strain_moduli = by_type("strain_moduli")  # (law) -> a, b of tau = a eps + b (tr eps) I
 units = by_type("units")                  # (law) -> laws of one modulus 1, the others 0

@@ -72,25 +72,26 @@ class DeformStep(NamedTuple):
 
 def fluid(step, bars, law):
     """Adjoint of `deform.fluid`."""
-    _fluid(step, bars, law, _like(step.L))
+    _fluid(step, bars, law, like_of(step.L))
 
 
 def elastic(step, bars, law):
     """Adjoint of `deform.elastic`."""
-    _elastic(step, bars, law, _like(step.L))
+    _elastic(step, bars, law, like_of(step.L))
 
 
 def plastic(step, bars, law, flow):
     """Adjoint of `deform.plastic`."""
-    _plastic(step, bars, law, flow, _like(step.L))
+    _plastic(step, bars, law, flow, like_of(step.L))
 
 
 def initial_stress(F, y, bars, law, flow, sums):
     """Adjoint of `deform.initial_stress`: adds to bars.F."""
-    _initial_stress(DeformStep(F, y, F, sums, 0.0), bars, law, flow, _like(F))
+    _initial_stress(DeformStep(F, y, F, sums, 0.0), bars, law, flow, like_of(F))
 
 
-def _like(a):
+def like_of(a):
+    """Return a tuple as long as the last axis of an array."""
     return tuple(range(a.shape[-1]))
 
 

@@ -13,13 +13,14 @@ each, a record that says what the layers mean; `table` lists the kinds.
 
 | file | elastic laws | flows |
 |---|---|---|
-| `network` | networks of `invariants` with the answers of `response` | as many |
+| `network`, `network_adjoint` | networks of `invariants` with the answers of `response` | as many |
 | `energetic`, `contraction` | an energy of four measures | a contraction of strain |
 | `stretch_network`, `spline` | networks and splines in stretches (`principal`) | |
 
 A learned law differs from the others in four things: it is for one number of dimensions, it has no
-differential (no implicit steps), its adjoint by F is at hand for whole arrays alone (`pull_back`),
-and it knows the strains that it was trained on (`strain_range`).
+differential (no implicit steps), its adjoint by F is at hand for whole arrays alone (`pull_back`)
+unless it is a network of F (`network_adjoint`), and it knows the strains that it was trained on
+(`strain_range`).
 """
 
 from .table import learned_flow, learned_law

@@ -107,15 +107,23 @@ def describe(F, s, a, p):
 @kernel
 def pull(F, factors, bars, F_bar, like, bounds):
     """Compute F_bar of the points bounds[0] .. bounds[1] - 1, from bars = (a_bar, R_bar)."""
-    d, (a_bar, R_bar) = len(like), bars
+    a_bar, R_bar = bars
     for p in range(bounds[0], bounds[1]):
-        F_p, U, V = mat(F, p, like), mat(factors.U, p, like), mat(factors.V, p, like)
-        from_s = mmt(mm(U, diag(vec(a_bar, p, like))), V)
-        spin = d_rotation(U, vec(factors.s, p, like), V, mat(R_bar, p, like))
-        C_bar = mat(a_bar[p, d:d + d * d].reshape(1, d, d), 0, like)
-        stretch = mm(F_p, mlin(1.0, C_bar, 1.0, transpose(C_bar)))
-        size = mlin(a_bar[p, d + d * d], cofactor(F_p), 1.0, stretch)
-        put_mat(F_bar, p, mlin(1.0, mlin(1.0, from_s, 1.0, spin), 1.0, size))
+        factors_p = mat(factors.U, p, like), vec(factors.s, p, like), mat(factors.V, p, like)
+        put_mat(F_bar, p, pulled(mat(F, p, like), factors_p, a_bar[p], mat(R_bar, p, like)))
+
+
+@kernel
+def pulled(F, factors, a_bar, R_bar):
+    """Return the bar of one F with factors (U, s, V), from those of its invariants and of R."""
+    (U, s, V), d = factors, len(F)
+    a = a_bar.reshape(1, -1)
+    from_s = mmt(mm(U, diag(vec(a, 0, s))), V)
+    spin = d_rotation(U, s, V, R_bar)
+    C_bar = mat(a[0, d:d + d * d].reshape(1, d, d), 0, F)
+    stretch = mm(F, mlin(1.0, C_bar, 1.0, transpose(C_bar)))
+    size = mlin(a_bar[d + d * d], cofactor(F), 1.0, stretch)
+    return mlin(1.0, mlin(1.0, from_s, 1.0, spin), 1.0, size)
 
 
 @parallel

@@ -181,17 +181,25 @@ def outputs(a, sizes, W, b):
 
 
 @kernel
-def network_answer(F, sizes, W, b):
-    """Return the network's Y at F, and R; NaN where F is not finite."""
+def read_inputs(F, s, sizes):
+    """Return the inputs of a network at F with singular values s: its invariants, or F - I."""
     d = len(F)
-    U, s, V, _ = svd(F)
     a = np.empty((1, d + d * d + 1))
     describe(F, s, a, 0)
     if sizes[0] == d * d:
         for i in range(d):
             for j in range(d):
                 a[0, d * i + j] = F[i][j] - (1.0 if i == j else 0.0)
-    return mat(outputs(a[0], sizes, W, b).reshape(1, d, d), 0, F), mmt(U, V)
+    return a[0, :sizes[0]]
+
+
+@kernel
+def network_answer(F, sizes, W, b):
+    """Return the network's Y at F, and R; NaN where F is not finite."""
+    d = len(F)
+    U, s, V, _ = svd(F)
+    a = read_inputs(F, s, sizes)
+    return mat(outputs(a, sizes, W, b).reshape(1, d, d), 0, F), mmt(U, V)
 
 
 @kernel

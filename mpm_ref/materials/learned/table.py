@@ -16,7 +16,15 @@ from .. import (
     NoFlow,
     VonMises,
 )
-from . import contraction, energetic, network, response, spline, stretch_network
+from . import (
+    contraction,
+    energetic,
+    network,
+    network_adjoint,  # noqa: F401  registers the adjoints of networks
+    response,
+    spline,
+    stretch_network,
+)
 from .contraction import ANSWERED, READ, Contraction
 from .energetic import MEASURES, Energetic
 from .invariants import count
