@@ -1,5 +1,7 @@
 """`mpm-ref law train`: weights, progress, checkpoints, the run to learn from. Needs PyTorch."""
 
+from shutil import copyfile
+
 import h5py
 import numpy as np
 import pytest
@@ -25,6 +27,7 @@ from mpm_ref.scene import digest  # noqa: E402
 from mpm_ref.store.journal import JournaledFile  # noqa: E402
 from mpm_ref.store.running import Options, checkpoint_of, run  # noqa: E402
 from mpm_ref.store.writer import StoredFields  # noqa: E402
+from mpm_ref.training import sha256  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
@@ -70,6 +73,22 @@ def test_weights_are_those_of_the_training_by_hand(made):
         for (W, b), (V, c) in zip(own.layers, law.weights().layers, strict=True):
             assert np.array_equal(W, V)
             assert np.array_equal(b, c)
+
+
+def test_a_training_goes_on_from_the_laws_of_another(made, tmp_path):
+    """Its first epoch has the error of those laws, over the same segments."""
+    copyfile(made / "whole.npz", tmp_path / "first.npz")
+    study = load(write_study(tmp_path, ("[train]", 'start = "first.npz"\n[train]')))
+    laws = law_trainer.continued_laws(weights.load(tmp_path / "first.npz"))
+    data = trajectory_of(observed(study.problem()))
+    session = fit.train(study.tables.train, laws, make_world(study.problem()), data)
+    assert train(study.path, tmp_path / "laws.npz").exit_code == 0
+    found, drawn = (weights.load(path).about for path in (tmp_path / "laws.npz",
+                                                          made / "whole.npz"))
+    assert found["errors"] == [epoch.error for epoch in session.history]
+    assert found["errors"][0] != drawn["errors"][0]
+    assert found["start_sha256"] == sha256((tmp_path / "first.npz").read_bytes())
+    assert "start_sha256" not in drawn
 
 
 def test_weights_say_how_they_were_made(made):

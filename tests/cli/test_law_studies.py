@@ -82,6 +82,10 @@ def test_without_pytorch_one_sentence_says_so(tmp_path, without_torch):
     (("[train]", '[laws]\nelastc = "Stress"\n[train]'), "laws.elastc: unknown key; did you mean"),
     (("[train]", "[set]\nbody.cub.density = 1.0\n[train]"), "set: 'body.cub.density' leads now"),
     (("cube.toml", "none.toml"), "scene = 'none.toml': there is no such file, nor a bundled"),
+    (("[train]", 'start = "none.npz"\n[train]'), "start = 'none.npz': there is no such file"),
+    (("[train]", 'start = "a.npz"\nmethod = "spline"\n[train]'),
+     "start = 'a.npz': only laws of method = \"ours\" go on"),
+    (("[train]", 'start = "a.npz"\n[laws]\nunit = 2.0\n[train]'), "leave out `laws` and another"),
     (("[train]", "[train"), "not valid TOML"),
     (('scene = "cube.toml"', ""), "scene: this key is missing"),
 ])

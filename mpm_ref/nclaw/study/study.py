@@ -65,11 +65,15 @@ class LawStudyTables(LawStudyTable, rename={"overrides": "set"}):
     overrides: dict = field(default_factory=dict)   # {path: value} of the scene
     laws: AnswerTable = AnswerTable()
     train: Recipe = field(default_factory=Recipe)
-    weights: str | None = None      # file, from the folder of this one
-    checkpoint: str | None = None   # file, from there too
+    start: str | None = None        # file of laws to go on from, from the folder of this one
+    weights: str | None = None      # file, from there too
+    checkpoint: str | None = None
 
     def __post_init__(self):
         one_of("method", self.method, METHOD_KINDS)
+        if self.start is not None and (self.method, self.laws) != ("ours", AnswerTable()):
+            raise ValueError(f'start = {self.start!r}: only laws of method = "ours" go on, with '
+                             "the kinds of their file; leave out `laws` and another method")
         with errors_at("laws"):
             records_of(self.method, self.laws)
 
@@ -164,6 +168,9 @@ def load(path, scenes=None):
         tables = parse_tables(data)
         study = LawStudy(path, base_scene(tables, path.parent, scenes or {}), tables)
         require_learnable(study)
+        start = study.file("start")
+        if start is not None and not start.is_file():
+            raise SceneError(f"start = {tables.start!r}: there is no such file of laws")
         return study
 
 

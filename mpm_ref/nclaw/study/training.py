@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ... import scene
+from ...materials.learned import weights
 from ...materials.learned.strain_range import strain_bounds
 from ...store.manifest import source_hash, versions
 from ...store.results import BadResults, Results
 from ...store.running import Options, run
 from ...store.writer import StoredFields, require_run
-from ...training import import_with_torch
+from ...training import import_with_torch, sha256
 from ...trajectories import Observed
 from ..bodies import body_maker
 from .compare import RunBroken, positions, threads_for
@@ -37,7 +38,7 @@ def train_study(study, observed, checkpoint=None, on_epoch=None, **about):
     """
     how, recipe, problem = trainer(), study.tables.train, study.problem()
     how.use_threads(about["threads"])
-    laws = how.initial_laws(study.tables.method, recipe.seed, study.tables.records, study.material)
+    laws = start_of_training(how, study)
     done = how.train_laws(study.tables.method, recipe, laws, (problem, observed), checkpoint,
                           on_epoch)
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
@@ -46,6 +47,16 @@ def train_study(study, observed, checkpoint=None, on_epoch=None, **about):
         "torch": how.version()})
     error = run_error(study.problem(), body_maker(trained), observed.x)
     return trained._replace(about={**trained.about, "run_error": error})
+
+
+def start_of_training(how, study):
+    """Return the `LawPair` that the training of a study begins with: that of its file `start`, or
+    one that is drawn. Raises ValueError for a file that has no such laws.
+    """
+    tables, start = study.tables, study.file("start")
+    if start is not None:
+        return how.continued_laws(weights.load(start))
+    return how.initial_laws(tables.method, tables.train.seed, tables.records, study.material)
 
 
 def run_error(problem, maker, x):
@@ -68,11 +79,15 @@ def run_error(problem, maker, x):
 
 
 def identity(study):
-    """Return what identifies a training: scene, method, recipe and versions, as plain values."""
+    """Return what identifies a training: scene, method, recipe and versions, as plain values; and
+    the laws that it goes on from, if any.
+    """
+    start = study.file("start")
+    origin = {} if start is None else {"start_sha256": sha256(start.read_bytes())}
     return {"scene_sha256": scene.digest(study.scene), "title": study.scene.title,
             "dt": study.scene.dt, "method": study.tables.method,
             "recipe": asdict(study.tables.train), "source_sha256": source_hash(),
-            "versions": versions()}
+            "versions": versions(), **origin}
 
 
 def is_complete(path, problem):
