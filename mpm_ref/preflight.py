@@ -155,8 +155,8 @@ def _spacing(body):
 # blocks that enter later
 
 def _swaying(problem, bodies):
-    """Yield the sentences about the first block after that of the start which a source that sways
-    lets into a solid, or into another body, as these stand at the start.
+    """Yield the sentences about a block after that of the start, the first of those looked at, which
+    a source that sways lets into a solid, or into another body, as these stand at the start.
     """
     for source in problem.sources:
         if source.sway is None:
@@ -168,8 +168,8 @@ def _swaying(problem, bodies):
             sentences = [*_in_solids(problem, [block])]
             for other in others:
                 sentences += _in_each_other([block, other])
-            yield from (f"block {k} of a source, from t = {source.time(k):.3g} s on: {sentence}"
-                        for sentence in sentences)
+            at_entry = f"block {k} of a source, which enters at t = {source.time(k):.3g} s"
+            yield from (f"{at_entry}: {sentence}" for sentence in sentences)
             if sentences:
                 break
 

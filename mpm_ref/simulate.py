@@ -76,7 +76,8 @@ def start(problem, stepper):
     """Return the first `State` of a problem, with stress, energy account and stable time step.
 
     Raises ValueError if a body does not fit the scheme, `Unstable` for a state that is not sound,
-    `core.grid.OutOfRange` where no grid covers it or a source, `TooLarge` for a dt past its bound.
+    `core.grid.OutOfRange` where no grid covers it, or nodes
+    around a source have no number, `TooLarge` for a dt past its bound.
     """
     state = State(problem.bodies)
     stepper.start(filled(state.bodies))

@@ -64,6 +64,7 @@ def train(
         with options():
             study = load(find_study(name), bundled_scenes())
             out = out or study.file("weights") or Path(f"{study.path.stem}.npz")
+            require_start(study, out, seeds)
         if seeds > 1:
             train_seeds(study, name, SeedOptions(seeds, out, data, workers, scheduler, overwrite))
         else:
@@ -86,6 +87,22 @@ def train_one(study, name, out, data, threads, overwrite):
         weights.save(out, laws)
     checkpoint.unlink(missing_ok=True)
     print(f"{out}: {summary_text(study, observation, laws.about['errors'])}")
+
+
+def require_start(study, out, seeds):
+    """Raise ValueError for a file `start` of a study that no training goes on from, that is the
+    file of the weights to write, or with several seeds, which would change nothing.
+    """
+    start = study.file("start")
+    if start is None:
+        return
+    if seeds > 1:
+        raise ValueError(f"--seeds {seeds}: the laws begin as those of start = "
+                         f"{study.tables.start!r}, whatever the seed; leave out --seeds")
+    if start.resolve() == out.resolve():
+        raise ValueError(f"--out {out}: this is the file that the training goes on from; name "
+                         "another one")
+    training.start_of_training(training.trainer(), study)
 
 
 def require_outputs(study, out, data, overwrite):
@@ -160,7 +177,8 @@ class Epochs:
         if self.made == 1:          # parts before took no time in this one; and kernels compile
             self.bar.initial = self.bar.n = self.bar.last_print_n = done - 1
             self.began = perf_counter()
-            warn(nothing_to_learn(self.study, history))
+            if self.study.tables.start is None:
+                warn(nothing_to_learn(self.study, history))
         self.bar.set_postfix_str(said, refresh=False)
         self.bar.update()
         if self.bar.disable and (done % ceil(self.total / SAID) == 0 or done == self.total):

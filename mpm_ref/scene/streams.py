@@ -107,7 +107,8 @@ def held_regions(scene):
 def region_place(record):
     """Return the `core.motion.Motion` of the shape of a source that sways; None where it stands.
 
-    It jumps from block to block, so that each is held until it has left its shape.
+    It jumps from block to block, so that each is held until it has left its shape, if blocks are
+    as long as the shape or longer.
     """
     sway = sway_of(record)
     if sway is None:

@@ -1,5 +1,6 @@
 """`mpm-ref law train`: weights, progress, checkpoints, the run to learn from. Needs PyTorch."""
 
+import hashlib
 from shutil import copyfile
 
 import h5py
@@ -27,7 +28,6 @@ from mpm_ref.scene import digest  # noqa: E402
 from mpm_ref.store.journal import JournaledFile  # noqa: E402
 from mpm_ref.store.running import Options, checkpoint_of, run  # noqa: E402
 from mpm_ref.store.writer import StoredFields  # noqa: E402
-from mpm_ref.training import sha256  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
@@ -77,9 +77,14 @@ def test_weights_are_those_of_the_training_by_hand(made):
 
 def test_a_training_goes_on_from_the_laws_of_another(made, tmp_path):
     """Its first epoch has the error of those laws, over the same segments."""
-    copyfile(made / "whole.npz", tmp_path / "first.npz")
+    first = tmp_path / "first.npz"
+    copyfile(made / "whole.npz", first)
     study = load(write_study(tmp_path, ("[train]", 'start = "first.npz"\n[train]')))
-    laws = law_trainer.continued_laws(weights.load(tmp_path / "first.npz"))
+    laws = law_trainer.drawn_laws("ours", 0, *study.tables.records)
+    with torch.no_grad():
+        for own, law in zip(weights.load(first)[:2], laws, strict=True):
+            for (W, _), V in zip(own.layers, law.parameters(), strict=True):
+                V.copy_(torch.from_numpy(W.T))
     data = trajectory_of(observed(study.problem()))
     session = fit.train(study.tables.train, laws, make_world(study.problem()), data)
     assert train(study.path, tmp_path / "laws.npz").exit_code == 0
@@ -87,8 +92,18 @@ def test_a_training_goes_on_from_the_laws_of_another(made, tmp_path):
                                                           made / "whole.npz"))
     assert found["errors"] == [epoch.error for epoch in session.history]
     assert found["errors"][0] != drawn["errors"][0]
-    assert found["start_sha256"] == sha256((tmp_path / "first.npz").read_bytes())
+    assert found["start_sha256"] == hashlib.sha256(first.read_bytes()).hexdigest()
     assert "start_sha256" not in drawn
+
+
+def test_what_a_training_cannot_go_on_from_is_refused_before_the_run(made, tmp_path):
+    copyfile(made / "whole.npz", tmp_path / "first.npz")
+    study = write_study(tmp_path, ("[train]", 'start = "first.npz"\n[train]'))
+    assert_told(train(study, tmp_path / "laws.npz", "--seeds", "2"), 2, "leave out --seeds")
+    assert_told(train(study, tmp_path / "first.npz", "--overwrite"), 2, "name another one")
+    (tmp_path / "first.npz").write_bytes(b"no weights")
+    assert_told(train(study, tmp_path / "laws.npz", "--data", tmp_path / "run.h5"), 2, "first.npz")
+    assert not (tmp_path / "run.h5").exists()
 
 
 def test_weights_say_how_they_were_made(made):

@@ -27,6 +27,7 @@ from mpm_ref.nclaw.train.fit import TrajectorySession  # noqa: E402
 from mpm_ref.nclaw.train.neural_laws import (  # noqa: E402
     MultilayerPerceptron,
     NeuralLawModule,
+    describe,
     layers_of,
     neural_laws,
 )
@@ -245,9 +246,13 @@ def test_a_training_goes_on_from_stored_laws():
     for a, b in zip(parameters(laws), parameters(resumed), strict=True):
         assert torch.equal(a, b)
     assert [law.kind for law in resumed] == [*STIFF]
-    other = learned_laws(drawn_laws("no rotation", 0, PlainStress(1e5), PlainCorrection(0.1)), {})
-    with pytest.raises(ValueError, match="expected those of the method 'ours'"):
-        continued_laws(other)
+    assert describe(resumed.elastic)[:-1] == describe(laws.elastic)
+    assert describe(resumed.elastic)[-1] != describe(resumed.plastic)[-1]
+    for method, kinds in (("no rotation", (PlainStress(1e5), PlainCorrection(0.1))),
+                          ("no undeformed", STIFF)):
+        other = learned_laws(drawn_laws(method, 0, *kinds), {})
+        with pytest.raises(ValueError, match="expected those of the method 'ours'"):
+            continued_laws(other)
 
 
 @pytest.mark.parametrize("every", [2, 3, STEPS])

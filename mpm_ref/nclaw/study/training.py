@@ -2,6 +2,7 @@
 and the laws with the record of their training.
 """
 
+import hashlib
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from ...store.manifest import source_hash, versions
 from ...store.results import BadResults, Results
 from ...store.running import Options, run
 from ...store.writer import StoredFields, require_run
-from ...training import import_with_torch, sha256
+from ...training import import_with_torch
 from ...trajectories import Observed
 from ..bodies import body_maker
 from .compare import RunBroken, positions, threads_for
@@ -36,14 +37,14 @@ def train_study(study, observed, checkpoint=None, on_epoch=None, **about):
     training, with the `threads` of PyTorch. Raises ValueError without PyTorch and for a checkpoint
     of another training, and `Diverged` of `trainer`.
     """
-    how, recipe, problem = trainer(), study.tables.train, study.problem()
+    how, recipe, problem, facts = trainer(), study.tables.train, study.problem(), identity(study)
     how.use_threads(about["threads"])
     laws = start_of_training(how, study)
     done = how.train_laws(study.tables.method, recipe, laws, (problem, observed), checkpoint,
                           on_epoch)
     took = {f"{clock}_seconds": round(s, 1) for clock, s in done.meter.total._asdict().items()}
     trained = how.learned_laws(laws, {
-        **about, **identity(study), **took, **done.errors, "seen": strain_bounds(observed.F),
+        **about, **facts, **took, **done.errors, "seen": strain_bounds(observed.F),
         "torch": how.version()})
     error = run_error(study.problem(), body_maker(trained), observed.x)
     return trained._replace(about={**trained.about, "run_error": error})
@@ -82,8 +83,9 @@ def identity(study):
     """Return what identifies a training: scene, method, recipe and versions, as plain values; and
     the laws that it goes on from, if any.
     """
-    start = study.file("start")
-    origin = {} if start is None else {"start_sha256": sha256(start.read_bytes())}
+    origin, start = {}, study.file("start")
+    if start is not None:
+        origin["start_sha256"] = hashlib.sha256(start.read_bytes()).hexdigest()
     return {"scene_sha256": scene.digest(study.scene), "title": study.scene.title,
             "dt": study.scene.dt, "method": study.tables.method,
             "recipe": asdict(study.tables.train), "source_sha256": source_hash(),

@@ -20,6 +20,7 @@ from torch import nn
 from ...materials import NoFlow
 from ...materials.learned.invariants import count
 from ...materials.learned.weights import LawWeights
+from ...training import sha256
 from .autograd import Answer, Invariants
 from .rollout import LawPair
 
@@ -29,6 +30,8 @@ NO_FLOW = NoFlow()
 
 class LawModule(nn.Module):
     """A law that is trained; its kind is one of those that `weights` can store."""
+
+    resumed = ""        # digest of the weights that it goes on from
 
     def __init__(self, kind):
         super().__init__()
@@ -40,8 +43,12 @@ class LawModule(nn.Module):
 
 
 def describe(law):
-    """Return plain values that identify a law before training: class, constants, layer sizes."""
-    return [type(law).__name__, law.extra_repr(), [list(a.shape) for a in law.parameters()]]
+    """Return plain values that identify a law before training: class, constants, layer sizes, and
+    the digest of the weights that it goes on from, if any.
+    """
+    resumed = [law.resumed] if law.resumed else []
+    return [type(law).__name__, law.extra_repr(), [list(a.shape) for a in law.parameters()],
+            *resumed]
 
 
 class MultilayerPerceptron(nn.Module):
@@ -103,6 +110,7 @@ class NeuralLawModule(LawModule):
     def resume(self, weights):
         """Take over the layers of `LawWeights` of the same kind and sizes."""
         put_layers(self.net, weights.layers)
+        self.resumed = sha256(*(W for W, _ in weights.layers))
 
 
 def neural_laws(seed, elastic, plastic, dim=3):

@@ -45,7 +45,7 @@ class Recipe:
     times segments over steps: not printed, and part of the recipe, since gradients are small beside
     the 1e-8 that Adam adds to their size. The "printed" one is the mean over steps, in m^2.
     `batch` segments run at once, which affects only time and round-off. The backward sweep keeps
-    every `keep_every`-th of their states and computes those between anew, which affects memory,
+    at least every `keep_every`-th of their states and computes others anew, which affects memory,
     time and round-off. `seed` is that of the laws' start, and of the order of pairs (see
     `labeled`). `velocity` [s^2] weighs squared errors of velocities beside those of positions
     (NCLAW-aux, printed without its value).

@@ -49,7 +49,8 @@ def segment_errors(laws, world, observed, starts, ends, recipe=DEFAULT):
     over the steps of segments from time levels `starts` to later ones, `ends`.
 
     Segments that have ended go no further. In the loss the errors of velocities are added, times
-    the recipe's `velocity` [s^2]. Of the states the backward sweep keeps every `keep_every`-th.
+    the recipe's `velocity` [s^2]. Of the states the backward sweep keeps at least every
+    `keep_every`-th.
     """
     levels, last = torch.tensor(starts), torch.tensor(ends)
     state, nodes = observed.states(levels), make_nodes(world, len(starts))

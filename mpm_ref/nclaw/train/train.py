@@ -63,14 +63,15 @@ def drawn_laws(method, seed, elastic, plastic):
 
 
 def continued_laws(learned):
-    """Return the `LawPair` of "ours" with the weights of `LearnedLaws` of that method, in single
-    precision. Raises ValueError for laws of another method.
+    """Return the `LawPair` of "ours" with the weights of `LearnedLaws`, in single precision. Raises
+    ValueError for laws of other kinds, layers or with biases, which those of "ours" have not.
     """
     laws = drawn_laws("ours", 0, learned.elastic.kind, learned.plastic.kind)
     for law, own in zip(laws, (learned.elastic, learned.plastic), strict=True):
-        if [W.shape for W, _ in own.layers] != [W.shape for W, _ in law.weights().layers]:
+        expected = [W.shape for W, _ in law.weights().layers]
+        if [W.shape for W, _ in own.layers] != expected or any(b.any() for _, b in own.layers):
             raise ValueError(f"laws with layers {[W.shape for W, _ in own.layers]}: expected those "
-                             f"of the method 'ours', {[W.shape for W, _ in law.weights().layers]}")
+                             f"of the method 'ours', {expected} without biases")
         law.resume(own)
     return laws
 
