@@ -155,7 +155,7 @@ def _spacing(body):
 # blocks that enter later
 
 def _swaying(problem, bodies):
-    """Yield the sentences about a block which a source that sways lets into a solid, or into another
+    """Yield the sentences about a block that a swaying source lets into a solid, or into another
     body, as these stand at the start: the first of those looked at, after that of the start.
     """
     for source in problem.sources:

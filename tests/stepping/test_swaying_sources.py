@@ -206,12 +206,12 @@ def test_blocks_that_enter_in_a_solid_or_a_body_are_warned_of():
     source = sway(2, LEVEL)
     assert not misplaced(problem(2, source, more=WALL.format(x=0.95)))
     (warning,) = misplaced(problem(2, source, more=WALL.format(x=0.7)))
-    assert warning.startswith("block 1 of a source, which enters at t = 0.1 s: 12 of the 16 particles of "
-                              "body 'jet' start inside collider[0]")
+    assert warning.startswith("block 1 of a source, which enters at t = 0.1 s: 12 of the "
+                              "16 particles of body 'jet' start inside collider[0]")
     assert not misplaced(problem(2, "", more=TARGET))
     (warning,) = misplaced(problem(2, source, more=TARGET))
-    assert warning.startswith("block 2 of a source, which enters at t = 0.2 s: bodies 'jet' and 'target' "
-                              "overlap")
+    assert warning.startswith("block 2 of a source, which enters at t = 0.2 s: bodies 'jet' "
+                              "and 'target' overlap")
     later = misplaced(problem(2, source + ", start = 0.2", more=TARGET))
     assert later[0].startswith("bodies 'jet' and 'target' overlap")     # the first one
 
