@@ -24,6 +24,8 @@ class CGOptions(NamedTuple):
     relative: callable      # tolerance, given sqrt(r0.P r0)
     cap: int = 10000        # iterations
     flexible: bool = False  # a preconditioner that varies: one more product of fields
+    enough: callable = None     # (x, k, energy) -> whether to end sooner, after k iterations,
+                                # which have given x the energy x.A x [J]
 
 
 class CGResult(NamedTuple):
@@ -68,20 +70,22 @@ def pcg(product, b, inverse, rule):
     goal = (rule.relative(sqrt(rz)) ** 2) * rz
     if rz <= goal:
         return CGResult(x, 0, None)
-    p = z.copy()
+    p, energy = z.copy(), 0.0
     for k in range(rule.cap):
         Ap = product(p)
         curvature = dot(p, Ap)
         if not 0.0 < curvature < inf:
             return CGResult(x if k else z, k, f"p.A p = {curvature:.3g} in CG: expected > 0")
         alpha = rz / curvature
-        x, r_old, r = x + alpha * p, r, r - alpha * Ap
+        x, r_old, r, energy = x + alpha * p, r, r - alpha * Ap, energy + alpha * rz
         z = inverse(r)
         rz_old, rz = rz, dot(r, z)
         if rz <= goal:
             return CGResult(x, k + 1, None)
         if not isfinite(rz):
             return CGResult(x, k + 1, f"r.P r = {rz:.3g} in CG: expected > 0")
+        if rule.enough is not None and rule.enough(x, k + 1, energy):
+            return CGResult(x, k + 1, None)
         mixed = dot(r_old, z) if rule.flexible else 0.0
         p = z + ((rz - mixed) / rz_old) * p
     return CGResult(x, rule.cap, f"CG reached its cap of {rule.cap} iterations")

@@ -163,11 +163,11 @@ class ProfiledSystem:
         with self.profiler.part("assembly"):
             return self.system.matrices(dv, levels)
 
-    def product(self, dv):
+    def product(self, dv, projected=True):
         """Return u -> B H B u, without a matrix."""
         self.profiler.hessians += 1
         with self.profiler.part("assembly"):
-            return self.profiler.timed("product", self.system.product(dv))
+            return self.profiler.timed("product", self.system.product(dv, projected))
 
     def diagonal(self, dv):
         """Diagonal blocks of the projected Hessian (n, d, d) [kg]."""

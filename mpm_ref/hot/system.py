@@ -105,9 +105,9 @@ class System:
         modes = self.tangent(dv).modes
         return [(self.matrix(dv), self.index), *self.coarse_grids.matrices(modes, levels)]
 
-    def product(self, dv):
-        """u -> B H B u at dv, without a matrix."""
-        tangent = self.tangent(dv)
+    def product(self, dv, projected=True):
+        """u -> B H B u at dv, without a matrix; H is that of `tangent`, or the exact one."""
+        tangent = self.tangent(dv) if projected else self.potential.tangent(dv, projected)
         return lambda u: self.project(tangent.product(self.project(u)))
 
     def diagonal(self, dv):

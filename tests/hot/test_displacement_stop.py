@@ -1,16 +1,19 @@
 """The stop by what a step hands on: particles are as near as asked, or the report says not."""
 
 from dataclasses import replace
-from math import isnan
+from math import inf, isnan
 
 import numpy as np
 import pytest
 from hot_cases import CASES, DEGREES, over, plain_bodies, problem_of
 from hot_steps import DT, stepper_of
 
+from mpm_ref.hot.displacement_stop import FEWEST, SAFETY, newton_check
 from mpm_ref.hot.lbfgs import LBFGS, REBUILD_COST
+from mpm_ref.hot.line_search import Iterate
 from mpm_ref.hot.linearization import Linearization
 from mpm_ref.hot.methods import METHODS, minimise, options_of
+from mpm_ref.hot.report import Profiler
 from mpm_ref.plain import transfer
 
 LOOSE = 1e-2        # tolerance of the gradient that leaves much to do
@@ -64,6 +67,70 @@ def test_the_step_of_the_check_is_taken(step):
     assert found.report.iterations == alone.report.iterations + 1
     assert (system.particle_displacement(found.dv - exact)
             < 0.2 * system.particle_displacement(alone.dv - exact))
+
+
+class Springs:
+    """Nodes (n, d) on springs to the origin, each with a particle that rides on it."""
+
+    def __init__(self, K):
+        self.K = K
+
+    def evaluate(self, dv):
+        return 0.5 * float(np.sum(self.K * dv**2)), self.K * dv
+
+    def project(self, u):
+        return u
+
+    def particle_displacement(self, u):
+        return float(np.linalg.norm(u, axis=1).max())
+
+    def product(self, dv, projected=True):
+        """A Hessian that is 8 times too stiff if it is projected."""
+        return lambda u: (8.0 if projected else 1.0) * self.K * u
+
+
+def checked(system, dv, asked):
+    """The profiler and the next `Iterate` of a check of dv, with CG without preconditioner."""
+    profiler, options = Profiler(), options_of("hot", displacement_tolerance=asked)
+    point = Iterate(dv, *system.evaluate(dv))
+    return profiler, newton_check(system, point, lambda r: r.copy(), options, profiler)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_check_is_by_the_exact_hessian(d):
+    """On HOT's Twist the projected one made the step of the check 8 times too short."""
+    system, dv = Springs(np.ones((5, d))), np.random.default_rng(1).normal(size=(5, d))
+    profiler, better = checked(system, dv, 100.0)
+    assert profiler.particle_error == pytest.approx(SAFETY * system.particle_displacement(dv))
+    assert system.particle_displacement(better.dv) < 1e-12
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_check_waits_for_soft_modes_that_cg_finds_late(d):
+    """The error is in them; after 50 iterations CG has a tenth of it."""
+    K = np.logspace(-5.0, 0.0, 300 * d).reshape(300, d)
+    system, dv = Springs(K), K**-0.75
+    error = system.particle_displacement(dv)
+    early, _ = checked(system, dv, 1e-9 * error)            # is too long at once
+    assert early.cg_iterations == FEWEST
+    assert early.particle_error < SAFETY * 0.1 * error
+    for asked in (0.5 * error, 10.0 * error):
+        late, better = checked(system, dv, asked)
+        assert late.cg_iterations > FEWEST
+        assert (late.particle_error <= asked) == (error <= asked)
+    assert error <= late.particle_error <= 2.0 * SAFETY * error
+    assert system.particle_displacement(better.dv) < 0.6 * error
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_check_where_the_energy_is_no_minimum_tells_nothing(d):
+    """However short the step; it still lowers the energy."""
+    K = np.ones((5, d))
+    K[2] = -0.5
+    system, dv = Springs(K), np.full((5, d), 1e-9)
+    profiler, better = checked(system, dv, 1.0)
+    assert profiler.particle_error == inf
+    assert better.E < system.evaluate(dv)[0]
 
 
 @pytest.mark.parametrize("word", ["hot", "pn-pcg"])

@@ -54,6 +54,26 @@ def test_pcg_of_a_small_matrix_ends_after_as_many_steps_as_there_are_unknowns():
     assert np.allclose(solved.x, answer(A, b), rtol=1e-9)
 
 
+@pytest.mark.parametrize("flexible", [False, True])
+def test_pcg_ends_when_it_is_enough(problem, flexible):
+    """The question is put after each iteration, with the energy of its x."""
+    A, b, _ = problem
+    energies = []
+
+    def enough(x, k, energy):
+        energies.append((np.sum(x * matrix_product(A)(x)), energy))
+        return k == 7
+
+    inverse = block_jacobi(diagonal_blocks(A))
+    rule = CGOptions(tight, flexible=flexible, enough=enough)
+    solved = pcg(matrix_product(A), b, inverse, rule)
+    capped = pcg(matrix_product(A), b, inverse, CGOptions(tight, cap=7, flexible=flexible))
+    assert (solved.iterations, solved.message) == (7, None)
+    assert solved.x.tobytes() == capped.x.tobytes()
+    assert len(energies) == 7
+    assert np.allclose(*np.transpose(energies), rtol=1e-10)
+
+
 @pytest.mark.parametrize("k", [0.5, 1e-2, 1e-5])
 def test_pcg_stops_at_the_first_iterate_within_the_energy_norm(problem, k):
     A, b, _ = problem

@@ -51,6 +51,16 @@ def test_product_and_diagonal_are_those_of_the_matrix(at):
     assert np.abs(system.diagonal(dv) - blocks).max() < 1e-13 * scale
 
 
+def test_exact_product_is_the_slope_of_the_gradient(at):
+    """The projected one is not: the states are strained enough for negative eigenvalues."""
+    system, dv = at
+    w, h = system.project(np.random.default_rng(6).normal(size=dv.shape)), 1e-6 * np.abs(dv).max()
+    slope = (system.evaluate(dv + h * w)[1] - system.evaluate(dv - h * w)[1]) / (2.0 * h)
+    exact, scale = system.product(dv, projected=False)(w), np.abs(slope).max()
+    assert np.abs(exact - slope).max() < 1e-6 * scale
+    assert np.abs(system.product(dv)(w) - slope).max() > 1e-3 * scale
+
+
 def test_gradient_has_no_part_along_what_is_held(at):
     system, dv = at
     g = system.evaluate(dv)[1]

@@ -1,10 +1,11 @@
 """The stop by what a step hands on (`mpm_ref.hot.displacement_stop`), tried on other
 scenes than those it was fitted to.
 
-Its safety factor was chosen on the bar of Figure 20, the wheel and the aluminium sheets, its cap on
-CG on the first steps of donut and chain in the middle of things; here are other scenes, and later
-steps. Asked for an error of the particles' displacement, do the methods hold it, and what does
-that cost beside a tolerance of the gradient that happens to leave the same error?
+Its safety factor was chosen on the bar of Figure 20, the wheel and the aluminium sheets, the fewest
+iterations of its CG on the first steps of donut and chain in the middle of things, the share of
+energy that ends CG on the wheel; here are other scenes, and later steps. Asked for an error of the
+particles' displacement, do the methods hold it, and what does that cost beside a tolerance of the
+gradient that happens to leave the same error?
 """
 
 from itertools import islice
@@ -27,7 +28,7 @@ PAPER = 1e-7
 EXACT = 1e-11                           # ... of the references
 CHECKED = 3.0                           # the references differ by less than 1 / 3 of what is asked
 CAPS = {"max_iterations": 1000, "max_cg_iterations": 20000}
-CONTROLLED_SHARE = 0.95                             # share of the solves that the rule is to hold
+CONTROLLED_SHARE = 0.99                             # share of the solves that the rule is to hold
 
 
 class StopTrial(NamedTuple):
@@ -45,7 +46,7 @@ class StopTrial(NamedTuple):
 
 
 @experiment("trade.hot.held", title="HOT: a stop that controls the error of displacement",
-            profiles=("quick", "standard"), budget={"quick": 6, "standard": 900})
+            profiles=("quick", "standard"), budget={"quick": 6, "standard": 1200})
 def displacement_stop(run):
     """Solve scenes to several tolerances of displacement; record the shares that met them."""
     names, asked = run.choose(
