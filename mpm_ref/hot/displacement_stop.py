@@ -108,8 +108,8 @@ def newton_check(system, point, inverse, options, profiler):
     rule = CGOptions(lambda size: CHECK, options.max_cg_iterations, flexible=True, enough=enough)
     linear, capped = Linearization(system.product(point.dv, False), inverse), profiler.capped_solves
     e = system.project(solve(linear, -point.g, rule, profiler))
-    told = profiler.capped_solves == capped
-    profiler.particle_error = SAFETY * system.particle_displacement(e) if told else inf
+    ended = profiler.capped_solves == capped
+    profiler.particle_error = SAFETY * system.particle_displacement(e) if ended else inf
     found = search(system, point, e, options.search)
     profiler.backtracks += found.backtracks
     return found.point
