@@ -29,7 +29,7 @@ FLOORS = (
      "core.adjoint.moments core.adjoint.records core.adjoint.slopes",
      "core.adjoint.grid", "core.adjoint.deform core.adjoint.corotated core.adjoint.strain "
      "core.adjoint.blocks core.adjoint.block_steps"),
-    ("core.mass_nodes",),
+    ("core.mass_nodes", "core.adjoint.full"),
     ("core.boundary",),
     ("core.adjoint.boundary", "core.surface", "core.body_contact core.crowded_nodes"),
     ("core core.adjoint",),

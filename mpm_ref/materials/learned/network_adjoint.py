@@ -25,7 +25,7 @@ DENSITY = 1.0 / sqrt(2.0 * pi)      # of the normal distribution at 0
 
 @kernel
 def gelu_slope(z):
-    """Return gelu'(z)."""
+    """Return the derivative of `gelu`."""
     return 0.5 * (1.0 + erf(ROOT * z)) + z * DENSITY * exp(-0.5 * z * z)
 
 
