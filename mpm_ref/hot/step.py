@@ -25,7 +25,8 @@ from .report import combined_report
 from .return_map import check_return_map
 from .system import System, Unknowns, free_part, unknowns_of
 
-MAX_UPDATES = 20      # of the active set and loads; after that, nodes stay as they are
+MAX_UPDATES = 20      # of the active set; after that, nodes stay as they are
+LOAD_UPDATES = 40     # ... and of the loads of friction: stiff blocks in a corner took up to 26
 FRICTION_TOLERANCE = 1e-3   # of the displacement in a step with friction [dx]
 LOAD_CHANGE = 1e-3    # of the sum of frictions: smaller changes between two solves end the step
 
@@ -147,8 +148,8 @@ class ImplicitStepper(Stepper):
         The active set of separate planes, and the loads that friction depends on, are updated
         between solves, each of which starts from the result of the one before.
         """
-        dv, reports = None, []
-        for self.active_set_updates in range(MAX_UPDATES):
+        dv, reports, most = None, [], most_updates(problem.active_set)
+        for self.active_set_updates in range(most):
             solution = minimise(self.system(problem, dv), self.options)
             reports.append(solution.report)
             self.report, dv = combined_report(reports), solution.dv
@@ -156,9 +157,9 @@ class ImplicitStepper(Stepper):
             if updated is None:
                 return dv
             problem = updated
-        self.active_set_updates = MAX_UPDATES
+        self.active_set_updates = most
         self.report = self.report._replace(converged=False, message="separate planes or the loads "
-                                           f"of friction still changed after {MAX_UPDATES} solves")
+                                           f"of friction still changed after {most} solves")
         return dv
 
     def _updated(self, problem, dv):
@@ -176,6 +177,11 @@ class ImplicitStepper(Stepper):
             changed = changed or load_change(potential.friction, friction) > LOAD_CHANGE
             potential = potential.with_friction(friction)
         return problem._replace(unknowns=unknowns, potential=potential) if changed else None
+
+
+def most_updates(active_set):
+    """Return how often a step may update its `ActiveSet` or None, with the loads if a part rubs."""
+    return LOAD_UPDATES if active_set is not None and active_set.rubs else MAX_UPDATES
 
 
 def potential_stencil(scheme):

@@ -60,7 +60,7 @@ class Toy:
     def matrices(self, dv, levels):
         return [(self.matrix(dv), self.index)]
 
-    def product(self, dv):
+    def product(self, dv, projected=True):
         self.calls["product"] += 1
         H = self.dense(dv)
         return lambda u: np.einsum("namb,mb->na", H, u)
