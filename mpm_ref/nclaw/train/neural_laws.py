@@ -46,7 +46,7 @@ def describe(law):
     """Return plain values that identify a law before training: class, constants, layer sizes, and
     the digest of the weights that it goes on from, if any.
     """
-    resumed = [law.resumed] if law.resumed else []
+    resumed = [law.resumed] if getattr(law, "resumed", "") else []
     return [type(law).__name__, law.extra_repr(), [list(a.shape) for a in law.parameters()],
             *resumed]
 
