@@ -28,6 +28,7 @@ from validation.training.nclaw import main  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
+VELOCITIES = Recipe(velocity=1.0)
 STEPS = 36          # the corner hits the floor at about half of them
 H = 1e-3 * 0.5 ** np.arange(5)
 
@@ -80,7 +81,7 @@ def test_velocities_count_in_depth_alone(true, seen):
     with torch.no_grad():
         laws = exact(problem)
         with_it, without = (
-            segment_errors(laws, where, film, [0], [STEPS], weight).loss.item()
+            segment_errors(laws, where, film, [0], [STEPS], Recipe(velocity=weight)).loss.item()
             for weight in (3.0, 0.0))
     depth = (run.v[1:STEPS + 1, :, 2] ** 2).mean(axis=1).sum()
     assert with_it - without == pytest.approx(3.0 * depth, rel=1e-6)
@@ -127,13 +128,14 @@ def test_gradient_is_exact(seen):
     start = [a.detach().clone() for a in own]
     torch.manual_seed(1)
     way = [torch.randn_like(a) for a in own]
-    slopes = torch.autograd.grad(segment_errors(laws, where, film, [0], [STEPS], 1.0).loss, own)
+    loss_now = segment_errors(laws, where, film, [0], [STEPS], VELOCITIES).loss
+    slopes = torch.autograd.grad(loss_now, own)
 
     def loss(h):
         with torch.no_grad():
             for a, first, da in zip(own, start, way, strict=True):
                 a[:] = first + h * da
-            return segment_errors(laws, where, film, [0], [STEPS], 1.0).loss.item()
+            return segment_errors(laws, where, film, [0], [STEPS], VELOCITIES).loss.item()
 
     slope = sum((g * da).sum() for g, da in zip(slopes, way, strict=True)).item()
     assert rate(loss, slope, H) == pytest.approx(2.0, abs=0.1)

@@ -54,7 +54,7 @@ def ones(whole):
 def gradients(data, where, cuts, velocity=0.0):
     """The loss of segments, and its gradients."""
     made = laws()
-    loss = segment_errors(made, where, data, cuts[:-1], cuts[1:], velocity).loss
+    loss = segment_errors(made, where, data, cuts[:-1], cuts[1:], Recipe(velocity=velocity)).loss
     loss.backward()
     return loss.item(), [a.grad.clone() for law in made for a in law.parameters()]
 
