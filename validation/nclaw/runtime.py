@@ -4,6 +4,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 
+from mpm_ref.core.blas import one_thread
 from mpm_ref.nclaw.bodies import body_maker, copy_body
 from mpm_ref.nclaw.study.compare import RunBroken
 from mpm_ref.scene import build
@@ -71,9 +72,11 @@ def timed(scene, laws, repeats):
 
 
 def run_times(scene, law):
-    """Return the wall and CPU time [s] of a run; NaN of one that broke down."""
+    """Return the wall and CPU time [s] of a run; NaN of one that broke down. Products of graph
+    networks have one thread: more would spin for a moment in the run that comes next.
+    """
     problem = build(scene)
-    with threads_for(problem.bodies):
+    with threads_for(problem.bodies), one_thread():
         run = frames(problem, law)
         next(run)
         wall, cpu = perf_counter(), process_time()
