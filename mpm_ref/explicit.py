@@ -285,13 +285,14 @@ def deform_driver(body):
 
 
 def deformation(body, dt):
-    """Return particles, law, flow, dt and a tuple as long as a position, all in the precision of
-    the particles.
+    """Return particles, law, flow, dt and a tuple as long as a position: of single particles all in
+    their precision, of others as they are, since learned laws may have layers in single.
     """
     particles, real = body.particles, body.particles.F.dtype.type
-    like = tuple(range(particles.x.shape[1]))
-    like = like if real is np.float64 else tuple(map(real, like))
-    return particles, *converted((body.law, body.flow, dt), real), like
+    like, numbers = tuple(range(particles.x.shape[1])), (body.law, body.flow, dt)
+    if real is np.float64:
+        return particles, *numbers, like
+    return particles, *converted(numbers, real), tuple(map(real, like))
 
 
 def initial_stress(body):

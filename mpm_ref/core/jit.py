@@ -19,6 +19,8 @@ Every option and its reason:
   on a machine that does other work too. Set GOMP_SPINCOUNT or OMP_WAIT_POLICY to choose otherwise.
   The spin is that of GNU's library alone.
 * ``pipeline_class``: kernels of single arguments compute in single precision (`precision`).
+* ``_nrt``: arrays are counted, also in kernels that a `borrowing` one calls, which would pass its
+  option on.
 * ``no_cfunc_wrapper``: no kernel is handed to C, and the wrapper for that takes time to compile.
 * Parallel loops run over a fixed number of chunks, never over "one chunk per thread": a result is a
   function of the input alone. See `chunk` and `total`.
@@ -54,7 +56,8 @@ prange = numba.prange       # of the drivers
 few_items = int(os.environ.get(FEW_ITEMS, "2000"))
 
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef)
-_OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True, "pipeline_class": Compiler}
+_OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True, "pipeline_class": Compiler,
+            "_nrt": True}
 
 if "OMP_WAIT_POLICY" not in os.environ:         # both are read when the library is loaded
     os.environ["OMP_WAIT_POLICY"] = "PASSIVE"
@@ -205,6 +208,14 @@ def kernel(function):
 def leaf(function):
     """Compile a formula that is worth inlining although it is long, as LLVM would not by itself."""
     return Kernel(function, forceinline=True)
+
+
+def borrowing(function):
+    """Compile a formula as a `leaf` that borrows the arrays of its arguments: it does not count
+    references to them, which takes longer than what it computes, and more so where threads share
+    the counters. The compiler refuses one that makes an array or returns a new one.
+    """
+    return Kernel(function, forceinline=True, _nrt=False)
 
 
 def parallel(function):

@@ -38,15 +38,17 @@ def copy_body(body):
     return body_with_laws(body, body.law, body.flow)
 
 
-def body_maker(laws, bounds=None):
+def body_maker(laws, bounds=None, precision="double"):
     """Return a function that gives a body the laws of `LearnedLaws`.
 
     bounds: those of a training, to which the guard cuts strains (see `learned.guard`); by default
-    there is no guard, and the laws are as they were trained.
+    there is no guard, and the laws are as they were trained;
+    precision: of their layers (see `learned_law`).
 
     Raises ValueError for an elastic law that is no stress, and a plastic one that is no return map.
     """
-    elastic, plastic = learned_law(laws.elastic), learned_flow(laws.plastic)
+    elastic = learned_law(laws.elastic, precision)
+    plastic = learned_flow(laws.plastic, precision)
     if bounds is not None:
         box = strain_box(bounds)
         elastic, plastic = guarded(elastic, box), guarded(plastic, box)

@@ -63,7 +63,7 @@ def check_precision(scene):
     neural = [body.name for body in scene.body if body.material.is_neural]
     if scene.scheme.precision == "single" and neural:
         raise SceneError('scheme.precision = "single": the learned law of body '
-                         f'{neural[0]!r} computes in double; expected "double"')
+                         f'{neural[0]!r} gives its stress in double; expected "double"')
 
 
 def build_material(body, dim, k):

@@ -73,12 +73,16 @@ class Material(Record):
     weights: str | None = None                  # file of trained laws (see learned.weights)
     sha256: Sha256 | None = None                # of what that file must hold
     guard: bool = True                          # whether strains are cut (see learned.guard)
+    precision: Literal["double", "single"] = "double"   # of a network's layers (learned.layers)
     flow: Flow = Flow(name="none")
 
     def __post_init__(self):
         if self.law != NEURAL and not self.guard:
             raise ValueError(f"guard = false: expected with the law {NEURAL!r} alone, whose "
                              "strains it cuts to those of training")
+        if self.law != NEURAL and self.precision != "double":
+            raise ValueError(f"precision = {self.precision!r}: expected with the law {NEURAL!r} "
+                             "alone, of whose layers it is; `scheme.precision` is that of a step")
         if self.law == NEURAL:
             self.trained()
         elif self.law in LAWS:
@@ -99,25 +103,26 @@ class Material(Record):
         """
         if self.is_neural:
             laws = self.trained(dim)
-            return learned_law(laws.elastic), learned_flow(laws.plastic), laws.about
+            return (learned_law(laws.elastic, self.precision),
+                    learned_flow(laws.plastic, self.precision), laws.about)
         law = self.elastic()
         return law, make_flow(self.flow.name, law, dim, **_given(self.flow, "name")), None
 
     def elastic(self):
         """Return the elastic law by its name. Raises ValueError as `build`."""
-        return make_law(self.law, **_given(self, "law", "guard", "flow"))
+        return make_law(self.law, **_given(self, "law", "guard", "precision", "flow"))
 
     def trained(self, dim=None):
         """Return the `LearnedLaws` of the file.
 
         Raises ValueError for a file without laws or of other dimensions, and for superfluous keys.
         """
-        superfluous = [*_given(self, "law", "weights", "sha256", "guard", "flow")]
+        superfluous = [*_given(self, "law", "weights", "sha256", "guard", "precision", "flow")]
         superfluous += ["flow"] if self.flow != Flow(name="none") else []
         if superfluous:
             raise ValueError(f"law {NEURAL!r}: unknown parameter {', '.join(superfluous)}; all "
-                             "that it takes is `weights`, which hold the return map too, and "
-                             "`guard`")
+                             "that it takes is `weights`, which hold the return map too, "
+                             "`guard` and `precision`")
         if self.weights is None:
             raise ValueError(f"law {NEURAL!r}: missing parameter weights, a file of trained laws")
         laws = weights.load(self.weights)

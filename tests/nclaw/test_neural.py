@@ -64,7 +64,7 @@ def answers(of, F):
     """Of a `LawWeights`, as compiled; F (n, d, d)."""
     stress = type(of.kind) in STRESSES
     law = network.build_law(of) if stress else network.build_flow(of)
-    name = network.kirchhoff if stress else network.respond
+    name = network.kirchhoff if stress else network.returned
     return np.array([name(tuple(map(tuple, F_p.tolist())), law) for F_p in F])
 
 

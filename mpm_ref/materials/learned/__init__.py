@@ -1,4 +1,4 @@
-"""Learned constitutive laws: networks and splines as materials, in doubles, without PyTorch.
+"""Learned constitutive laws: networks and splines as materials, without PyTorch.
 
 A learned law is a material like those of `mpm_ref.materials`: a NamedTuple of its numbers, which
 kernels are compiled for, whose file registers its functions with the names of `core.law` at its
@@ -13,9 +13,11 @@ each, a record that says what the layers mean; `table` lists the kinds.
 
 | file | elastic laws | flows |
 |---|---|---|
-| `network`, `network_adjoint` | networks of `invariants` with the answers of `response` | as many |
+| `network`, `layers`, `network_adjoint` | networks of `invariants`, answers of `response` | as many |
 | `energetic`, `contraction` | an energy of four measures | a contraction of strain |
 | `stretch_network`, `spline` | networks and splines in stretches (`principal`) | |
+
+All compute in double, but that layers of `network` may be in single (`learned_law`).
 
 A learned law differs from the others in four things: it is for one number of dimensions, it has no
 differential (no implicit steps), its adjoint by F is at hand for whole arrays alone (`pull_back`)

@@ -34,8 +34,9 @@ import numpy as np
 
 from ...core import law as registry
 from ...core.adjoint.deform import back, within
-from ...core.jit import CHUNKS, chunk, kernel, parallel, prange
-from ...core.spectral import UNDETERMINED, mixed, svd
+from ...core.jit import CHUNKS, borrowing, chunk, kernel, parallel, prange
+from ...core.lanes import stack
+from ...core.spectral import UNDETERMINED, mixed
 from ...core.tensor import (
     diagonal,
     dot,
@@ -55,8 +56,9 @@ from ..log_strain import deviator, log_strain, stretches
 from ..log_strain_adjoint import log_gap_ratio
 from ..no_flow import never_fails
 from ..stretches import inverse
-from .guard import NONE, cut, with_half_the_rest
-from .network import flatten, outputs, softplus
+from .guard import NONE, cut_factors, with_half_the_rest
+from .layers import outputs
+from .network import flatten, softplus
 from .principal import pull_back_stretches
 
 READ, ANSWERED = 3, 2
@@ -234,20 +236,22 @@ def _pull(G, c, factors, c_bar, F_bar):
         pull(G, c, factors, (c_bar, F_bar), chunk(k, len(G)))
 
 
-@kernel
-def contracted_point(F, flow):
-    """Return one F after the return; NaN unless det F > 0."""
-    U, s, V, _ = svd(F)
-    x = np.array(read(s, flow.strain))
-    y = outputs(x, flow.sizes, flow.W, flow.b)
-    return mmt(scale_columns(U, left(s, softplus(y[0]), softplus(y[1]))), V)
+@borrowing
+def contracted_point(factors, flow):
+    """Return one F after the return, of U, s, V of the trial; NaN unless det F > 0."""
+    U, s, V = factors
+    x, strains = stack(s[0], READ), read(s, flow.strain)
+    for k in range(READ):
+        x[k] = strains[k]
+    outputs(x, flow.sizes, flow.W, flow.b)
+    return mmt(scale_columns(U, left(s, softplus(x[0]), softplus(x[1]))), V)
 
 
-@kernel
+@borrowing
 def returned(F, flow):
     """Return F after the return map; NaN unless det F > 0."""
-    F_cut, is_cut = cut(F, flow.low, flow.high)
-    F_new = contracted_point(F_cut, flow)
+    F_cut, factors, is_cut = cut_factors(F, flow.low, flow.high)
+    F_new = contracted_point(factors, flow)
     return with_half_the_rest(F, F_cut, F_new) if is_cut else F_new
 
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.jit import kernel
+from ...core.jit import borrowing, kernel
 from ...core.spectral import svd
 from ...core.tensor import mlin, mmt, scale_columns
 from .strain_range import strain_measures
@@ -86,6 +86,20 @@ def cut(F, low, high):
     if same(c, s):
         return F, False
     return mmt(scale_columns(U, c), V), True
+
+
+@borrowing
+def cut_factors(F, low, high):
+    """Return what `cut` does, and in between U, s, V of the `svd` of F_cut."""
+    U, s, V, _ = svd(F)
+    if len(low) == 0:
+        return F, (U, s, V), False
+    c = cut_stretches(s, low, high)
+    if same(c, s):
+        return F, (U, s, V), False
+    F_cut = mmt(scale_columns(U, c), V)
+    U, s, V, _ = svd(F_cut)
+    return F_cut, (U, s, V), True
 
 
 @kernel

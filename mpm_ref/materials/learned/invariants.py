@@ -89,19 +89,19 @@ def turn(factors, R, like, bounds):
 def read(F, s, a, like, bounds):
     """Apply `describe` to the points bounds[0] .. bounds[1] - 1."""
     for p in range(bounds[0], bounds[1]):
-        describe(mat(F, p, like), vec(s, p, like), a, p)
+        describe(mat(F, p, like), vec(s, p, like), a[p])
 
 
 @kernel
-def describe(F, s, a, p):
-    """Set a[p] = (s - 1, F^T F - I, det F - 1), F^T F row by row."""
+def describe(F, s, a):
+    """Set a = (s - 1, F^T F - I, det F - 1), F^T F row by row; further entries of a stay."""
     d = len(s)
     C = mm(transpose(F), F)
     for i in range(d):
-        a[p, i] = s[i] - 1.0
+        a[i] = s[i] - 1.0
         for j in range(d):
-            a[p, d + d * i + j] = C[i][j] - (1.0 if i == j else 0.0)
-    a[p, d + d * d] = det(F) - 1.0
+            a[d + d * i + j] = C[i][j] - (1.0 if i == j else 0.0)
+    a[d + d * d] = det(F) - 1.0
 
 
 @kernel

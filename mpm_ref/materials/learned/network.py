@@ -1,35 +1,33 @@
-"""Trained networks as materials: records that kernels are compiled for, in doubles, no PyTorch.
+"""Trained networks as materials: records that kernels are compiled for, without PyTorch.
 
     tau = answer(net(a), F, R),    F' = answer(net'(a'), F_trial, R')
 
-with a of `invariants` and the answers of `response` (NCLAW-alg2, NCLAW-alg4), point by point:
-
-    a_0 = a,   a_{l+1} = gelu(a_l W_l + b_l),   y = a_{L-1} W_{L-1} + b_{L-1}
-
-gelu(z) = z (1 + erf(z / sqrt 2)) / 2. Loops run over the rows of W, so that a sum over inputs adds
-vectors of outputs: the compiler can use vector registers without reordering a sum.
+with a of `invariants`, the layers of `layers` and the answers of `response` (NCLAW-alg2,
+NCLAW-alg4), point by point. All is in double, but for the layers of a record whose weights are
+single (`with_single_layers`).
 
 Such a stress has no energy. Its stiffness is computed at rest alone, by finite differences.
 """
 
-from math import erf, exp, log1p, sqrt
+from math import exp, log1p
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core import law as names
-from ...core.jit import kernel
-from ...core.spectral import svd
-from ...core.tensor import mat, mmt
+from ...core.jit import borrowing, kernel
+from ...core.lanes import stack
+from ...core.tensor import mmt
 from ..no_flow import never_fails
 from ..waves import moduli_at_rest, stiffness
 from . import response
-from .guard import NONE, cut, with_half_the_rest
+from .guard import NONE, cut_factors, with_half_the_rest
 from .invariants import count, describe
+from .layers import outputs
 from .response import answer
 
 STEP = 1e-6             # of the differences at rest
-ROOT = sqrt(0.5)
+INPUTS = 16             # room for them, and for outputs
 
 
 class NeuralLaw(NamedTuple):
@@ -131,6 +129,13 @@ def flatten(layers):
     return np.array(sizes), W, b
 
 
+def with_single_layers(law):
+    """Return a law or a flow whose layers compute in single precision. Its moduli stay those of its
+    layers in double, since differences at rest lose the digits that single has.
+    """
+    return law._replace(W=law.W.astype(np.float32), b=law.b.astype(np.float32))
+
+
 def moduli_of(law):
     """Return the `NeuralLaw.wave` and `NeuralLaw.largest`, of its tangents at rest: along the
     stiffest axis, and the norm of the whole map from strains to stresses. Pull and push differ,
@@ -151,76 +156,65 @@ def stress_of(F, law):
 
 
 @kernel
-def gelu(z):
-    """Return z times the normal distribution's share below z."""
-    return 0.5 * z * (1.0 + erf(ROOT * z))
-
-
-@kernel
 def softplus(z):
     """Return log(1 + exp z)."""
     return max(z, 0.0) + log1p(exp(-abs(z)))
 
 
-@kernel
-def outputs(a, sizes, W, b):
-    """Return the outputs of a network at inputs a."""
-    w, k, last = 0, 0, len(sizes) - 1
-    for l in range(last):
-        n, m = sizes[l], sizes[l + 1]
-        z = b[k:k + m].copy()
-        for i in range(n):
-            a_i, row = a[i], W[w + i * m:w + (i + 1) * m]
-            for j in range(m):
-                z[j] += a_i * row[j]
-        if l < last - 1:
-            for j in range(m):
-                z[j] = gelu(z[j])
-        a, w, k = z, w + n * m, k + m
-    return a
-
-
-@kernel
-def read_inputs(F, s, sizes):
-    """Return the inputs of a network at F with singular values s: its invariants, or F - I."""
+@borrowing
+def read_inputs(F, s, sizes, a):
+    """Set the first numbers of a to the inputs of a network at F with singular values s: its
+    invariants, or F - I.
+    """
     d = len(F)
-    a = np.empty((1, d + d * d + 1))
-    describe(F, s, a, 0)
     if sizes[0] == d * d:
         for i in range(d):
             for j in range(d):
-                a[0, d * i + j] = F[i][j] - (1.0 if i == j else 0.0)
-    return a[0, :sizes[0]]
+                a[d * i + j] = F[i][j] - (1.0 if i == j else 0.0)
+    else:
+        describe(F, s, a)
 
 
-@kernel
-def network_answer(F, sizes, W, b):
-    """Return the network's Y at F, and R; NaN where F is not finite."""
-    d = len(F)
-    U, s, V, _ = svd(F)
-    a = read_inputs(F, s, sizes)
-    return mat(outputs(a, sizes, W, b).reshape(1, d, d), 0, F), mmt(U, V)
+@borrowing
+def network_answer(F, factors, net):
+    """Return the network's Y at F, whose `svd` has the factors (U, s, V), and R; NaN where F is not
+    finite.
+    """
+    U, s, V = factors
+    a = stack(F[0][0], INPUTS)
+    read_inputs(F, s, net.sizes, a)
+    outputs(a, net.sizes, net.W, net.b)
+    return square(a, F), mmt(U, V)
 
 
-@kernel
-def respond(F, law):
-    """Return the answer of a law or a flow at F."""
-    Y, R = network_answer(F, law.sizes, law.W, law.b)
+@borrowing
+def square(a, like):
+    """Return the first d x d entries of an array as a matrix, row by row."""
+    if len(like) == 2:
+        return (a[0], a[1]), (a[2], a[3])
+    else:
+        return (a[0], a[1], a[2]), (a[3], a[4], a[5]), (a[6], a[7], a[8])
+
+
+@borrowing
+def respond(F, factors, law):
+    """Return the answer of a law or a flow at F with its factors (U, s, V)."""
+    Y, R = network_answer(F, factors, law)
     return answer(Y, F, R, law)
 
 
-@kernel
+@borrowing
 def kirchhoff(F, law):
     """Return tau = P F^T."""
-    F_cut, _ = cut(F, law.low, law.high)
-    return respond(F_cut, law)
+    F_cut, factors, _ = cut_factors(F, law.low, law.high)
+    return respond(F_cut, factors, law)
 
 
-@kernel
+@borrowing
 def returned(F, flow):
     """Return F after the return map."""
-    F_cut, is_cut = cut(F, flow.low, flow.high)
-    F_new = respond(F_cut, flow)
+    F_cut, factors, is_cut = cut_factors(F, flow.low, flow.high)
+    F_new = respond(F_cut, factors, flow)
     return with_half_the_rest(F, F_cut, F_new) if is_cut else F_new
 
 

@@ -17,7 +17,8 @@ from ...core.jit import kernel
 from ...core.spectral import svd
 from ...core.tensor import mat, mlin, mmt
 from .invariants import pulled
-from .network import FLOW_CLASSES, LAW_CLASSES, ROOT, gelu, outputs, read_inputs
+from .layers import ROOT, gelu, outputs
+from .network import FLOW_CLASSES, INPUTS, LAW_CLASSES, read_inputs, square
 from .response import bars
 
 DENSITY = 1.0 / sqrt(2.0 * pi)      # of the normal distribution at 0
@@ -79,14 +80,17 @@ def respond_bar(F, G, law):
     """Return the bar of F from that of the answer, G, of a law or a flow."""
     U, s, V, _ = svd(F)
     d = len(F)
-    a = read_inputs(F, s, law.sizes)
-    Y = mat(outputs(a, law.sizes, law.W, law.b).reshape(1, d, d), 0, F)
+    a = np.empty(INPUTS)
+    read_inputs(F, s, law.sizes, a)
+    inputs = a[:law.sizes[0]].copy()
+    outputs(a, law.sizes, law.W, law.b)
+    Y = square(a, F)
     Y_bar, F_bar, R_bar = bars(G, Y, F, mmt(U, V), law)
     y_bar = np.empty(d * d)
     for i in range(d):
         for j in range(d):
             y_bar[d * i + j] = Y_bar[i][j]
-    a_bar = input_bar(a, y_bar, law.sizes, law.W, law.b)
+    a_bar = input_bar(inputs, y_bar, law.sizes, law.W, law.b)
     if law.sizes[0] == d * d:
         from_inputs = mat(a_bar.reshape(1, d, d), 0, F)
     else:

@@ -7,6 +7,7 @@ no layers and are the law themselves.
 from collections.abc import Callable
 from typing import NamedTuple
 
+from ...core.precision import PRECISIONS
 from .. import (
     DruckerPrager,
     FixedCorotated,
@@ -36,18 +37,20 @@ class LearnedEntry(NamedTuple):
     build: Callable         # `LawWeights` -> the record that kernels are compiled for
     ends: frozenset         # {(inputs, outputs)} that the layers may have; empty: no layers
     in_scenes: bool = True  # whether it has a `stiffness`, which a run of a scene needs
+    in_single: Callable | None = None   # the same record with layers in single precision
 
 
 ROTATED = frozenset((count(d), d * d) for d in (2, 3))
 PLAIN = ROTATED | frozenset((d * d, d * d) for d in (2, 3))
+SINGLE = network.with_single_layers
 STRETCHES = LearnedEntry(stretch_network.build_law, frozenset({(2, 2), (3, 3)}), in_scenes=False)
 KNOTS = LearnedEntry(spline.build_law, frozenset({(len(spline.knots()), 3)}), in_scenes=False)
 IDENTIFIED = LearnedEntry(lambda weights: weights.kind, frozenset(), in_scenes=False)
 
 ELASTIC = {         # kind -> entry
-    response.Stress: LearnedEntry(network.build_law, ROTATED),
-    response.SymmetricStress: LearnedEntry(network.build_law, ROTATED),
-    response.PlainStress: LearnedEntry(network.build_law, PLAIN),
+    response.Stress: LearnedEntry(network.build_law, ROTATED, in_single=SINGLE),
+    response.SymmetricStress: LearnedEntry(network.build_law, ROTATED, in_single=SINGLE),
+    response.PlainStress: LearnedEntry(network.build_law, PLAIN, in_single=SINGLE),
     stretch_network.StretchStress: STRETCHES,
     stretch_network.ReleasedStretchStress: STRETCHES,
     spline.SplineStress: KNOTS,
@@ -56,8 +59,8 @@ ELASTIC = {         # kind -> entry
     **dict.fromkeys((FixedCorotated, Hencky, Fluid), IDENTIFIED),
 }
 PLASTIC = {
-    response.Correction: LearnedEntry(network.build_flow, ROTATED),
-    response.PlainCorrection: LearnedEntry(network.build_flow, PLAIN),
+    response.Correction: LearnedEntry(network.build_flow, ROTATED, in_single=SINGLE),
+    response.PlainCorrection: LearnedEntry(network.build_flow, PLAIN, in_single=SINGLE),
     Contraction: LearnedEntry(contraction.build_flow, frozenset({(READ, ANSWERED)})),
     **dict.fromkeys((NoFlow, DruckerPrager, VonMises, FluidProjection), IDENTIFIED),
 }
@@ -65,14 +68,32 @@ TABLES = {"elastic": ELASTIC, "plastic": PLASTIC}
 KINDS = {kind.__name__: kind for table in TABLES.values() for kind in table}
 
 
-def learned_law(weights):
-    """Return the elastic law of `LawWeights`. Raises ValueError for a kind that gives no stress."""
-    return _entry(ELASTIC, weights.kind).build(weights)
+def learned_law(weights, precision="double"):
+    """Return the elastic law of `LawWeights`, with layers in a precision of `core.precision`.
+
+    Raises ValueError for a kind that gives no stress, and for one that has no such precision.
+    """
+    return _learned(ELASTIC, weights, precision)
 
 
-def learned_flow(weights):
-    """Return the flow of `LawWeights`. Raises ValueError for a kind that gives no F."""
-    return _entry(PLASTIC, weights.kind).build(weights)
+def learned_flow(weights, precision="double"):
+    """Return the flow of `LawWeights`, as `learned_law`. Raises ValueError for a kind that gives no
+    F, and for one that has no such precision.
+    """
+    return _learned(PLASTIC, weights, precision)
+
+
+def _learned(table, weights, precision):
+    if precision not in PRECISIONS:
+        raise ValueError(f"precision = {precision!r}: expected {' or '.join(PRECISIONS)}")
+    entry = _entry(table, weights.kind)
+    law = entry.build(weights)
+    if precision == "double":
+        return law
+    if entry.in_single is None:
+        raise ValueError(f'precision = "single": laws of kind {type(weights.kind).__name__} '
+                         'compute in double alone; expected "double"')
+    return entry.in_single(law)
 
 
 def is_identified(part, kind):

@@ -6,12 +6,14 @@ from record_verdicts import expected, verdict
 
 from mpm_ref.nclaw.bodies import copy_body
 from mpm_ref.nclaw.gnn.simulator import Simulator
+from mpm_ref.scene import build
 from tests.validation.nclaw.test_gnn_evaluate import still, water
 from validation.common import targets
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nclaw import runtime
+from validation.nclaw.environments import environment
 from validation.nclaw.initial_laws import untrained
 from validation.nclaw.simulators import simulators
 
@@ -21,9 +23,10 @@ REPEATS = 10
 @pytest.fixture
 def runs(monkeypatch):
     """Weights of sand and its graph network are there. What was run, as (law, steps); a run of ours
-    takes k seconds, k its number, of a graph network three times, of the true laws half of that.
+    takes k seconds, k its number, of a graph network three times, of the true laws half of that, in
+    single precision 0.1 k.
     """
-    asked = []
+    asked, block = [], build(environment("sand", steps=5)).bodies[0]
 
     def found(name):
         if not name.startswith("sand"):
@@ -31,10 +34,12 @@ def runs(monkeypatch):
         return still() if name.endswith("gnn") else untrained()
 
     def took(scene, law):
-        word = "true" if law is copy_body else "gnn" if isinstance(law, Simulator) else "ours"
+        word = "true" if law is copy_body else "gnn" if isinstance(law, Simulator) else (
+            "ours" if law(block).law.W.dtype == float else "single")
         asked.append((word, scene.steps))
         k = sum(one == (word, 1000) for one in asked)
-        return k * {"true": 0.5, "ours": 1.0, "gnn": 3.0}[word], 10.0 * k
+        factor = {"true": 0.5, "ours": 1.0, "gnn": 3.0, "single": 0.1}[word]
+        return k * factor, k * (0.2 if word == "single" else 10.0)
 
     monkeypatch.setattr(runtime, "trained", found)
     monkeypatch.setattr(runtime, "run_times", took)
@@ -50,7 +55,7 @@ def recorded(folder):
 def test_laws_and_graph_networks_are_timed_in_turn(tmp_path, runs):
     """Each first in a run that compiles, which is not counted."""
     recorded(tmp_path)
-    words = ("ours", "gnn", "true")
+    words = ("ours", "gnn", "single", "true")
     assert runs == [*((word, 5) for word in words),
                     *((word, 1000) for _ in range(REPEATS) for word in words)]
 
@@ -64,6 +69,14 @@ def test_medians_stand_beside_the_printed_times(tmp_path, runs):
     assert gnn.note.endswith(simulators()["sand-gnn"].description)
     assert found["nclaw.table3.gnn.sand.cpu"].value == pytest.approx(55.0 / 1e6)
     assert found["nclaw.table3.gnn.sand.over_true"].value == 1.0
+
+
+def test_times_in_single_precision_have_ids_and_a_bound_of_their_own(tmp_path, runs):
+    found = recorded(tmp_path)
+    wall, cpu, most = (found[f"nclaw.table3.single{id}"] for id in (".sand", ".sand.cpu", ".cpu"))
+    assert (wall.value, verdict(wall)) == (pytest.approx(0.55), "info")
+    assert (cpu.value, verdict(cpu)) == (pytest.approx(1.1e-6), "info")
+    assert (most.value, most.bound, verdict(most)) == (pytest.approx(1.1e-6), 1.2e-6, "pass")
 
 
 def test_what_is_not_trained_is_told_and_not_run(tmp_path, runs):
