@@ -13,7 +13,7 @@ each, a record that says what the layers mean; `table` lists the kinds.
 
 | file | elastic laws | flows |
 |---|---|---|
-| `network`, `layers`, `network_adjoint` | networks of `invariants` (answers: `response`) | as many |
+| `network`, `layers`, `network_adjoint` | networks of `invariants` (answers: `response`) | too |
 | `energetic`, `contraction` | an energy of four measures | a contraction of strain |
 | `stretch_network`, `spline` | networks and splines in stretches (`principal`) | |
 
