@@ -13,7 +13,7 @@ from .evaluate import ComparedError, body_maker, compare
 from .printed_ids import error_id, is_printed, overall_id, run_variants
 from .rivals import RIVALS, PositionRival
 from .simulators import GraphNet
-from .stand_in_bodies import body_label
+from .stand_in_bodies import body_label, has_mesh
 from .tasks import TOYS, scenes
 from .trained_laws import nets
 
@@ -126,8 +126,12 @@ def overall(run, table, method, rows, asked):
 
 
 def bodies_note(tasks):
-    """Return the note on the bodies of task (c), where runs of it are among all."""
-    return "bodies of task (c) are stand-ins" if "geometry" in tasks else ""
+    """Return the note on those bodies of task (c) that are stand-ins, where runs of it are among
+    all; empty if none is.
+    """
+    others = [toy.name for toy in TOYS.values() if not has_mesh(toy.name)]
+    return (f"{', '.join(others)} of task (c) are stand-ins" if others and "geometry" in tasks
+            else "")
 
 
 def grouped(rows):
