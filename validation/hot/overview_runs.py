@@ -3,8 +3,6 @@
 `overview` measures three consecutive steps of larger scenes once their contact or pull has begun.
 """
 
-from mpm_ref.scene import build
-
 from ..common import targets
 from ..common.registry import experiment
 from .overview import (
@@ -18,16 +16,10 @@ from .overview import (
     size_text,
     smallest,
 )
-from .table3_runs import SIZE, steps_evenly
-from .warm_states import PRINTED, scene
+from .table3_runs import SIZE, run_steps
+from .warm_states import PRINTED
 
 CAPS = {"max_iterations": 15, "max_cg_iterations": 300}        # of Gast15
-
-
-def run_costs(name, count):
-    """Return ([`MethodCost`], [`Overview`]) of `count` steps evenly over a scene's run."""
-    steps = (step for _, step in steps_evenly(build(scene(name, SIZE)), count))
-    return costs_of_steps(name, steps, CAPS)
 
 
 @experiment("hot.fig15-runs", title="Speed-up overview over entire runs",
@@ -38,7 +30,8 @@ def speedups_over_runs(run):
     compile_methods(METHODS)
     rows, table = [], {}
     for name in run.progress(names, "scenes"):
-        step_costs, overviews = run_costs(name, count)
+        steps = run_steps(name, SIZE, run.folder / "states", count)
+        step_costs, overviews = costs_of_steps(name, (step for _, step in steps), CAPS)
         rows += step_costs
         table[name] = {o.method: o for o in overviews}
         for o in overviews:

@@ -24,6 +24,7 @@ from mpm_ref.timestep import TooLarge
 
 from ..common.provenance import commit
 from ..common.results import ROOT
+from .run_states import RunStates, even_times
 
 SHOTS = 12          # pictures after that of the start, evenly over the run
 COLUMNS = ("step", "t", "dt", "particles", "iterations", "coarse", "residual", "converged",
@@ -72,35 +73,49 @@ def run_history(scene, file, patience):
     stored = read(file)
     if stored is not None and {k: stored.facts.get(k) for k in key} == key:
         return stored
-    history = run(scene, patience)
+    history = run(scene, patience, file)
     history = history._replace(facts={**key, **history.facts, "commit": commit(ROOT)})
     write(file, history)
     return history
 
 
-def run(scene, patience):
-    """Run a scene from its start and return its `RunHistory`."""
+def run(scene, patience, file=None):
+    """Run a scene from its start and return its `RunHistory`; write its `RunStates` beside the file
+    of the history, if it has one.
+    """
     problem = build(scene)
     stepper = ImpulseStepper(problem.scheme, problem.dx, problem.dim, problem.gravity,
                              problem.conditions, problem.solver)
     state = State(first_bodies(problem.bodies, problem.sources))
     log = Log(problem, stepper, state)
+    states = None if file is None else RunStates(unpublished(file.parent), file.stem,
+                                                 even_times(problem))
     stepper.start(state.bodies)
     check(problem, state, 0.0)
     log.shot(show(state, 0.0))
     try:
-        why = step_to_end(problem, stepper, state, log, patience)
+        why = step_to_end(problem, stepper, state, Observers(log, states), patience)
     except (Unstable, OutOfRange, TooLarge) as error:
         why = str(error)
     return log.history(state, why)
 
 
-def step_to_end(problem, stepper, state, log, patience):
+class Observers(NamedTuple):
+    """What is kept of a run: its `Log`, and its `RunStates` or None."""
+
+    log: object
+    states: RunStates | None
+
+
+def step_to_end(problem, stepper, state, observers, patience):
     """Step to the end and return the reason for which the run ended."""
-    start = process_time()
+    (log, states), start, k = observers, process_time(), 0
     while not ended(problem.clock, state):
         if process_time() - start > patience:
             return f"more than {patience} CPU seconds"
+        if states and states.is_due(k, state):
+            states.write(k, state, problem)
+            k += 1
         counts = [len(body.id) for body in state.bodies]
         before = StepStart(counts, momentum(state.bodies), mass(state.bodies))
         since = process_time()

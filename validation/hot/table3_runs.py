@@ -5,13 +5,17 @@ by HOT to its end, at the size of the quick profile, and the steps that are meas
 the run, as the paper's means do. With so few particles they are no reproduction.
 """
 
+from functools import partial
+
 import numpy as np
 
 from mpm_ref.scene import build
-from mpm_ref.simulate import EVEN, ended, simulate
+from mpm_ref.simulate import ended, simulate
 
 from ..common.registry import experiment
 from .one_step import implicit_step, solve_step
+from .run_history import unpublished
+from .run_states import RunStates, even_times
 from .table3 import METHODS, cost
 from .warm_states import PRINTED, next_step_length, scene, take_step
 
@@ -19,27 +23,44 @@ SIZE = "quick"
 COLUMNS = ("scene", "t", "dt", "particles", "preconditioner", "newton", "cg", "converged")
 
 
-def steps_evenly(problem, count):
-    """Yield (state, `ImplicitStep`) of `count` steps evenly over a run by the problem's method.
+def steps_evenly(problem, states):
+    """Yield (state, `ImplicitStep`) of the steps of a run from its `RunStates`: from those on disk,
+    else from the run by the problem's method, which writes them.
 
     Each is valid until the next is asked for. There are fewer where a step leads to the end.
     """
     state, stepper = next(simulate(problem)).state, problem.stepper()
-    due = problem.clock.end * (np.arange(count) + 0.5) / count
-    for t in due:
-        while state.t < t * (1.0 - EVEN) and not ended(problem.clock, state):
-            take_step(problem, stepper, state)
-        if ended(problem.clock, state):
-            return
+    for k in range(len(states.times)):
+        stored = states.read(k, problem)
+        if stored is None:
+            if k > 0:
+                take_step(problem, stepper, state)
+            if not march_to(problem, stepper, state, partial(states.is_due, k)):
+                return
+            states.write(k, state, problem)
+        else:
+            state = stored
         yield state, implicit_step(stepper, state, next_step_length(problem, stepper, state))
+
+
+def march_to(problem, stepper, state, is_due):
+    """Advance a state until it is due; return whether it is before the run ends."""
+    while not is_due(state) and not ended(problem.clock, state):
         take_step(problem, stepper, state)
+    return not ended(problem.clock, state)
 
 
-def measure(name, count):
-    """Return ({preconditioner: `RowCost`}, rows of COLUMNS) of a scene's entire run."""
-    problem = build(scene(name, SIZE))
+def run_steps(name, size, folder, count):
+    """Return the `steps_evenly` of a scene at a size, whose states are in a folder."""
+    problem = build(scene(name, size))
+    states = RunStates(unpublished(folder), name.removesuffix("_stiff"), even_times(problem, count))
+    return steps_evenly(problem, states)
+
+
+def measure(name, steps):
+    """Return ({preconditioner: `RowCost`}, rows of COLUMNS) of steps (see `steps_evenly`)."""
     advanced, rows, by_method = 0.0, [], {short: [] for short in METHODS}
-    for state, step in steps_evenly(problem, count):
+    for state, step in steps:
         advanced, size = advanced + step.dt, step.particles
         for short, method in METHODS.items():
             report = solve_step(step, method).report
@@ -57,7 +78,7 @@ def table3_runs(run):
     names, count = run.choose(quick=(("faceless",), 2), standard=(PRINTED, 10))
     table = []
     for name in run.progress(names, "scenes"):
-        costs, rows = measure(name, count)
+        costs, rows = measure(name, run_steps(name, SIZE, run.folder / "states", count))
         table += rows
         for short, mean in costs.items():
             few, most = np.quantile([row[6] for row in rows if row[4] == short], (0.0, 1.0))
