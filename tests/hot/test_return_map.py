@@ -14,11 +14,13 @@ from mpm_ref.hot.step import ImplicitStepper
 from mpm_ref.materials import (
     DruckerPrager,
     FixedCorotated,
+    FixedCorotatedVonMises,
     Hardening,
     Hencky,
     NoFlow,
     VonMises,
     YieldingHencky,
+    lame,
     yielding_hencky,
 )
 from mpm_ref.plain import transfer
@@ -118,6 +120,25 @@ def pressed(return_map, dt):
 def test_nodes_are_in_balance_with_the_stress_after_the_return():
     assert pressed("implicit", 0.005) < 1e-6
     assert pressed("lagged", 0.005) > 0.1
+
+
+def returned_tau(eps, law, flow):
+    """Principal Kirchhoff stresses after the return, of principal trial strains."""
+    s, _ = project(tuple(np.exp(eps)), 0.0, DT, law, flow)
+    return np.array(kirchhoff_hat(s, law))
+
+
+@pytest.mark.parametrize(("law", "flow", "least", "most"), [
+    (FixedCorotated(*lame(6.9e10, 0.33)), FixedCorotatedVonMises(2.4e8), 1e-2, 5e-2),
+    (FixedCorotated(*lame(2.07e5, 0.33)), FixedCorotatedVonMises(720.0), 1e-2, 5e-2),
+    (Hencky(*lame(6.9e10, 0.33)), VonMises(2.4e8, 0.0), 0.0, 1e-7)])
+def test_return_on_fixed_corotated_has_no_energy(law, flow, least, most):
+    """Work over a closed path of strains: the slope d tau/d eps of an energy is symmetric."""
+    direction = np.array([1.0, 0.2, -1.2]) / np.linalg.norm([1.0, 0.2, -1.2])
+    eps, h = 2.0 * flow.tau_y / (2.0 * law.mu) * direction, 1e-7
+    slope = np.array([(returned_tau(eps + h * e, law, flow) - returned_tau(eps - h * e, law, flow))
+                      / (2.0 * h) for e in np.eye(3)])
+    assert least <= np.linalg.norm(slope - slope.T) / np.linalg.norm(slope) <= most
 
 
 def test_what_has_no_potential_is_refused():
