@@ -21,9 +21,8 @@ def single_knobs(scene):
     transfer, given = scene.step_scheme.transfer, transfer_text(scene.step_scheme)
     settings = [setting(cfl=value) for value in cfl]
     settings += [setting(particles=factor) for factor in PARTICLES]
-    settings += [setting(transfer=text) for text in TRANSFERS
-                 if text != given and not (scene.integrator != "explicit" and text == "mls")]
-    settings += [setting(transfer=text) for text in relaxed_transfers(scene) if text != given]
+    settings += [setting(transfer=text) for text in (*TRANSFERS, *relaxed_transfers(scene))
+                 if text != given]
     settings += [with_degree(degree, transfer) for degree in DEGREES
                  if degree != scene.scheme.degree]
     settings += [setting(sampling=kind) for kind in other_samplings(scene)]

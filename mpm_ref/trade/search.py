@@ -37,7 +37,6 @@ HOPELESS = 3.0              # times the best cost, after which a candidate's run
 BEST_SINGLES = 4            # whose pairs are tried
 PERTURBED = "perturbed"     # label of the perturbed run
 ALTERNATIVE = {"mls": "apic", "apic": "mls", "flip": "apic", "pic": "apic"}
-IMPLICIT_ALTERNATIVE = {"mls": "apic", "apic": "flip", "flip": "apic", "pic": "apic"}
 
 
 @dataclass
@@ -168,9 +167,7 @@ class TradeSearch:
         It runs on the second finest grid; the error that it would have on the finest one, at the
         observed order, is a second estimate of how far the reference is from the solution.
         """
-        explicit = self.scene.integrator == "explicit"
-        others = ALTERNATIVE if explicit else IMPLICIT_ALTERNATIVE
-        other = others[self.scene.step_scheme.transfer]
+        other = ALTERNATIVE[self.scene.step_scheme.transfer]
         if len(self.levels) < 3 or self.scene.scheme.degree == 1:
             return
         chosen = setting(dx=self.levels[-2], transfer=other)

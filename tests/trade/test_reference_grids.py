@@ -186,7 +186,7 @@ def test_another_family_raises_the_error_of_the_reference():
 
 
 @pytest.mark.parametrize(("head", "other"), [
-    ("", "apic"), ('integrator = "hot"\n', "flip"),
+    ("", "apic"), ('integrator = "hot"\n', "mls"),
     ('integrator = "hot"\nscheme = { transfer = "flip" }\n', "apic")])
 def test_the_other_transfer_is_one_that_the_integrator_has(head, other):
     search = TradeSearch(loads(head + FLIGHT), ModelRuns(), ("positions",), TIMES, 0.01)

@@ -189,7 +189,7 @@ def test_single_knobs_are_not_those_of_the_scene():
     assert "integrator explicit, cfl 0.5" in implicit
     assert "eps 0.001" in implicit
     assert "eps 1e-07" not in implicit
-    assert "transfer mls" not in implicit           # tried in explicit runs alone
+    assert "transfer mls" in implicit
     assert "transfer pic" in implicit
     assert not any("relaxation" in text for text in implicit)
 
