@@ -143,7 +143,7 @@ def test_progress_is_said_where_there_is_no_terminal(made):
 
 
 def test_labeled_laws_are_trained_on_answers(tmp_path):
-    study = load(write_study(tmp_path, ("[train]", 'method = "labeled"\n[train]'), scene=[FLOWING]))
+    study = load(write_study(tmp_path, ('method = "ours"', 'method = "labeled"'), scene=[FLOWING]))
     problem, data = study.problem(), trajectory_of(observed(study.problem()))
     labels = labels_of(data, problem.bodies[0].law, problem.clock.dt)
     laws = law_trainer.drawn_laws("labeled", 0, *study.tables.records)
@@ -159,7 +159,7 @@ def test_constants_of_the_scene_are_identified(tmp_path):
     """They begin too small (see `sysid`). The modulus grows; as nothing yields yet, the yield
     stress has no gradient.
     """
-    study = write_study(tmp_path, ("[train]", 'method = "sys-id"\n[train]'), scene=[FLOWING])
+    study = write_study(tmp_path, ('method = "ours"', 'method = "sys-id"'), scene=[FLOWING])
     assert train(study, tmp_path / "laws.npz").exit_code == 0
     law, flow = (trained.kind for trained in weights.load(tmp_path / "laws.npz")[:2])
     true = load(study).problem().bodies[0]

@@ -242,12 +242,12 @@ def test_a_scene_alone_makes_a_law_study(tmp_path):
     file = write_study(tmp_path)
     file.write_text('scene = "cube.toml"')
     assert lines(file)[0].endswith(
-        ': a law study, untitled: laws of the scene cube.toml, method "ours"')
+        ': a law study, untitled: laws of the scene cube.toml, method "admissible"')
 
 
 def test_studies_of_labels_have_no_horizon_and_those_of_constants_no_networks(tmp_path):
     def told(method):
-        return lines(write_study(tmp_path, ("[train]", f'method = "{method}"\n[train]'),
+        return lines(write_study(tmp_path, ('method = "ours"', f'method = "{method}"'),
                                  scene=[FLOWING]))[2:]
 
     assert told("labeled")[1] == (

@@ -17,7 +17,7 @@ def train(folder, *edits, scene=(), options=()):
 
 
 def of_method(method):
-    return "[train]", f'method = "{method}"\n[train]'
+    return 'method = "ours"', f'method = "{method}"'
 
 
 def test_bundled_studies_load():
@@ -27,6 +27,7 @@ def test_bundled_studies_load():
     assert found["law_jelly"].scene.every == 1
     assert found["law_jelly_small"].tables.method == "spline"
     assert found["law_jelly_small"].scene.steps == 300
+    assert found["law_plasticine"].tables.method == "admissible"
 
 
 @pytest.mark.parametrize("method", law_study.METHOD_KINDS)
@@ -55,6 +56,13 @@ def test_recipes_differ_with_the_method_unless_given(tmp_path):
     assert load(write_study(tmp_path, of_method("labeled"))).tables.train.epochs == 4
 
 
+def test_a_study_without_a_method_learns_laws_that_thermodynamics_admits(tmp_path):
+    tables = load(write_study(tmp_path, ('method = "ours"\n', ""))).tables
+    assert tables.method == "admissible"
+    assert [type(record).__name__ for record in tables.records] == ["Energetic", "Contraction"]
+    assert (tables.train.elastic_rate, tables.train.plastic_rate) == (0.1, 0.01)
+
+
 def test_files_start_at_the_study(tmp_path):
     study = load(write_study(tmp_path, ("[train]", 'weights = "w.npz"\n[train]')))
     assert study.file("weights") == tmp_path / "w.npz"
@@ -74,8 +82,8 @@ def test_without_pytorch_one_sentence_says_so(tmp_path, without_torch):
     (("epochs = 4", 'reading = "both"'), "train.reading = 'both': expected release or printed"),
     (("epochs = 4", "clip = inf"), "train.clip = inf: expected a finite number"),
     (("[train]", "[[parameter]]"), "parameter: unknown key; the keys here are scene, title,"),
-    (("[train]", 'method = "our"\n[train]'), "method = 'our': expected one of 'ours', 'labeled'"),
-    (("[train]", "method = 3\n[train]"), "method = 3: expected text"),
+    (('"ours"', '"our"'), "method = 'our': expected one of 'ours', 'labeled'"),
+    (('"ours"', "3"), "method = 3: expected text"),
     (("[train]", '[laws]\nplastic = "NoFlow"\n[train]'), "laws.plastic = 'NoFlow': expected one"),
     (("[train]", "[laws]\nunit = 0.0\n[train]"), "laws.unit = 0.0: expected a positive number"),
     (("[train]", "[laws]\nstrain = 0.1\n[train]"), "laws.strain = 0.1: none of these laws has it"),
@@ -83,9 +91,9 @@ def test_without_pytorch_one_sentence_says_so(tmp_path, without_torch):
     (("[train]", "[set]\nbody.cub.density = 1.0\n[train]"), "set: 'body.cub.density' leads now"),
     (("cube.toml", "none.toml"), "scene = 'none.toml': there is no such file, nor a bundled"),
     (("[train]", 'start = "none.npz"\n[train]'), "start = 'none.npz': there is no such file"),
-    (("[train]", 'start = "a.npz"\nmethod = "spline"\n[train]'),
+    (('method = "ours"', 'start = "a.npz"\nmethod = "spline"'),
      "start = 'a.npz': only laws of method = \"ours\" go on"),
-    (("[train]", 'start = "a.npz"\n[laws]\nunit = 2.0\n[train]'), "leave out `laws` and another"),
+    (("[train]", 'start = "a.npz"\n[laws]\nunit = 2.0\n[train]'), "and no `laws`"),
     (("[train]", "[train"), "not valid TOML"),
     (('scene = "cube.toml"', ""), "scene: this key is missing"),
 ])
@@ -113,7 +121,7 @@ def test_constants_that_cannot_be_identified_are_refused(tmp_path, material):
 
 
 def test_kinds_of_identified_laws_are_not_asked_for(tmp_path):
-    edit = "[train]", 'method = "sys-id"\n[laws]\nelastic = "Hencky"\n[train]'
+    edit = 'method = "ours"\n\n[train]', 'method = "sys-id"\n[laws]\nelastic = "Hencky"\n[train]'
     assert_told(train(tmp_path, edit), 2, "learns the constants of the scene's own laws")
 
 

@@ -32,6 +32,7 @@ material = {{ law = "fixed_corotated", E = {E}, nu = {NU} }}
 """
 STUDY = """
 scene = "cube.toml"
+method = "ours"
 
 [train]
 epochs = 4

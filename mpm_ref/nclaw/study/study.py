@@ -23,6 +23,7 @@ from ..batched_step import make_world
 from ..train.recipe import Recipe
 
 SYS_ID = "sys-id"
+RECOMMENDED = "admissible"      # of the methods, where a study names none
 METHOD_KINDS = {        # method -> kinds of its elastic law and of its flow, the usual one first
     "ours": (("Stress", "SymmetricStress"), ("Correction",)),
     "labeled": (("Stress", "SymmetricStress"), ("Correction",)),
@@ -61,7 +62,7 @@ class LawStudyTables(LawStudyTable, rename={"overrides": "set"}):
 
     scene: str                      # a file, from the folder of this one; or bundled
     title: str = ""
-    method: str = "ours"            # of `nclaw.train.methods`
+    method: str = RECOMMENDED       # of `nclaw.train.methods`
     overrides: dict = field(default_factory=dict)   # {path: value} of the scene
     laws: AnswerTable = AnswerTable()
     train: Recipe = field(default_factory=Recipe)
@@ -73,7 +74,7 @@ class LawStudyTables(LawStudyTable, rename={"overrides": "set"}):
         one_of("method", self.method, METHOD_KINDS)
         if self.start is not None and (self.method, self.laws) != ("ours", AnswerTable()):
             raise ValueError(f'start = {self.start!r}: only laws of method = "ours" go on, with '
-                             "the kinds of their file; leave out `laws` and another method")
+                             'the kinds of their file; write method = "ours" and no `laws`')
         with errors_at("laws"):
             records_of(self.method, self.laws)
 
@@ -127,7 +128,7 @@ def parse_tables(data):
     require_keys(data, LawStudyTables.__struct_encode_fields__)
     require_keys(data.get("laws"), AnswerTable.__struct_encode_fields__, "laws")
     require_keys(data.get("train"), [one.name for one in fields(Recipe)], "train")
-    given, method = data.get("train", {}), data.get("method")
+    given, method = data.get("train", {}), data.get("method", RECOMMENDED)
     if isinstance(given, dict) and isinstance(method, str):
         data = data | {"train": USUAL.get(method, {}) | given}
     try:
