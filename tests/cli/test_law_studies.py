@@ -92,7 +92,7 @@ def test_without_pytorch_one_sentence_says_so(tmp_path, without_torch):
     (("cube.toml", "none.toml"), "scene = 'none.toml': there is no such file, nor a bundled"),
     (("[train]", 'start = "none.npz"\n[train]'), "start = 'none.npz': there is no such file"),
     (('method = "ours"', 'start = "a.npz"\nmethod = "spline"'),
-     "start = 'a.npz': only laws of method = \"ours\" go on"),
+     "start = 'a.npz': only laws of the methods ours and admissible go on"),
     (("[train]", 'start = "a.npz"\n[laws]\nunit = 2.0\n[train]'), "and no `laws`"),
     (("[train]", "[train"), "not valid TOML"),
     (('scene = "cube.toml"', ""), "scene: this key is missing"),

@@ -42,7 +42,7 @@ GRAPH_OPTIONS = ("steps", "width", "batch", "noise", "first_rate", "last_rate", 
 def untrained_laws(net):
     """Return the `Laws` of a `LawNet` before training, or those from which it goes on."""
     if net.start:
-        return train.continued_laws(trained(net.start))
+        return train.continued_laws(net.method, trained(net.start))
     kinds = () if net.method == SYS_ID else (
         KINDS[net.elastic](), KINDS[net.plastic]())
     material = environment(net.environment).body[0].material

@@ -23,6 +23,7 @@ from ..batched_step import make_world
 from ..train.recipe import Recipe
 
 SYS_ID = "sys-id"
+CONTINUED = ("ours", "admissible")      # methods whose laws may go on from those of a file
 RECOMMENDED = "admissible"      # of the methods, where a study names none
 METHOD_KINDS = {        # method -> kinds of its elastic law and of its flow, the usual one first
     "ours": (("Stress", "SymmetricStress"), ("Correction",)),
@@ -72,9 +73,11 @@ class LawStudyTables(LawStudyTable, rename={"overrides": "set"}):
 
     def __post_init__(self):
         one_of("method", self.method, METHOD_KINDS)
-        if self.start is not None and (self.method, self.laws) != ("ours", AnswerTable()):
-            raise ValueError(f'start = {self.start!r}: only laws of method = "ours" go on, with '
-                             'the kinds of their file; write method = "ours" and no `laws`')
+        if self.start is not None and (self.method not in CONTINUED
+                                       or self.laws != AnswerTable()):
+            raise ValueError(f'start = {self.start!r}: only laws of the methods '
+                             f'{" and ".join(CONTINUED)} go on, with the kinds of their file; '
+                             "write one of these and no `laws`")
         with errors_at("laws"):
             records_of(self.method, self.laws)
 

@@ -56,7 +56,7 @@ def start_of_training(how, study):
     """
     tables, start = study.tables, study.file("start")
     if start is not None:
-        return how.continued_laws(weights.load(start))
+        return how.continued_laws(tables.method, weights.load(start))
     return how.initial_laws(tables.method, tables.train.seed, tables.records, study.material)
 
 

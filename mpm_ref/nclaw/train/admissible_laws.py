@@ -16,7 +16,7 @@ from torch.autograd import Function
 from ...materials.learned import contraction, energetic
 from ...materials.learned.invariants import spectrum
 from ...materials.learned.weights import LawWeights
-from .neural_laws import LawModule, MultilayerPerceptron, layers_of
+from .neural_laws import LawModule, MultilayerPerceptron, digest, layers_of, put_layers
 
 HIDDEN = {"elastic": (16, 16), "plastic": (32, 32)}
 START = 1e-3        # a and b of the return map, at first
@@ -124,6 +124,15 @@ class GrowingConvex(nn.Module):
                      for log_W, b in zip(self.log_W, biases, strict=True))
 
 
+    def put(self, layers):
+        """Write layers, as those of `layers`."""
+        with torch.no_grad():
+            for log_W, (W, _) in zip(self.log_W, layers, strict=True):
+                log_W.copy_(torch.from_numpy(W).log())
+            for b, (_, own) in zip(self.b, layers[:-1], strict=True):
+                b.copy_(torch.from_numpy(own))
+
+
 class EnergyLawModule(LawModule):
     """F (n, 3, 3) -> tau (n, 3, 3) [Pa] of an energy."""
 
@@ -138,6 +147,11 @@ class EnergyLawModule(LawModule):
     def weights(self):
         """Return the `LawWeights` of the law."""
         return LawWeights(self.net.layers(), self.kind)
+
+    def resume(self, weights):
+        """Take over the layers of `LawWeights` of the same kind and sizes."""
+        self.net.put(weights.layers)
+        self.resumed = digest(weights)
 
 
 class ContractionModule(LawModule):
@@ -159,3 +173,8 @@ class ContractionModule(LawModule):
     def weights(self):
         """Return the `LawWeights` of the law."""
         return LawWeights(tuple(layers_of(self.net)), self.kind)
+
+    def resume(self, weights):
+        """Take over the layers of `LawWeights` of the same kind and sizes."""
+        put_layers(self.net, weights.layers)
+        self.resumed = digest(weights)

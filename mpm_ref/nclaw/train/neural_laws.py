@@ -85,10 +85,12 @@ def layers_of(net):
 
 
 def put_layers(net, layers):
-    """Write layers, as those of `layers_of`, into a network without biases."""
+    """Write layers, as those of `layers_of`, into a network; biases where it has them."""
     with torch.no_grad():
-        for layer, (W, _) in zip(net.layers, layers, strict=True):
+        for layer, (W, b) in zip(net.layers, layers, strict=True):
             layer.weight.copy_(torch.from_numpy(W.T))
+            if layer.bias is not None:
+                layer.bias.copy_(torch.from_numpy(b))
 
 
 class NeuralLawModule(LawModule):
@@ -110,7 +112,12 @@ class NeuralLawModule(LawModule):
     def resume(self, weights):
         """Take over the layers of `LawWeights` of the same kind and sizes."""
         put_layers(self.net, weights.layers)
-        self.resumed = sha256(*(W for W, _ in weights.layers))
+        self.resumed = digest(weights)
+
+
+def digest(weights):
+    """Return the digest of the layers of `LawWeights`."""
+    return sha256(*(a for layer in weights.layers for a in layer))
 
 
 def neural_laws(seed, elastic, plastic, dim=3):

@@ -62,18 +62,26 @@ def drawn_laws(method, seed, elastic, plastic):
                                                       strict=True)))
 
 
-def continued_laws(learned):
-    """Return the `LawPair` of "ours" with the weights of `LearnedLaws`, in single precision. Raises
-    ValueError for laws of other kinds, layers or with biases, which those of "ours" have not.
+def continued_laws(method, learned):
+    """Return the `LawPair` of a method of CONTINUED with the weights of `LearnedLaws`, for "ours"
+    in single precision. Raises ValueError for laws of other kinds or layers.
     """
-    laws = drawn_laws("ours", 0, learned.elastic.kind, learned.plastic.kind)
+    laws = drawn_laws(method, 0, learned.elastic.kind, learned.plastic.kind)
     for law, own in zip(laws, (learned.elastic, learned.plastic), strict=True):
-        expected = [W.shape for W, _ in law.weights().layers]
-        if [W.shape for W, _ in own.layers] != expected or any(b.any() for _, b in own.layers):
-            raise ValueError(f"laws with layers {[W.shape for W, _ in own.layers]}: expected those "
-                             f"of the method 'ours', {expected} without biases")
+        require_layers(method, law.weights().layers, own.layers)
         law.resume(own)
+        if any(b.any() != c.any() for (_, b), (_, c) in zip(law.weights().layers, own.layers,
+                                                            strict=True)):
+            raise ValueError(f"laws with biases: expected those of the method {method!r}, without")
     return laws
+
+
+def require_layers(method, drawn, given):
+    """Raise ValueError unless given layers have the shapes of those that are drawn."""
+    shapes, expected = ([W.shape for W, _ in layers] for layers in (given, drawn))
+    if shapes != expected:
+        raise ValueError(f"laws with layers {shapes}: expected those of the method {method!r}, "
+                         f"{expected}")
 
 
 def initial_laws(method, seed, kinds, material):
