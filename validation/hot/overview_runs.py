@@ -16,10 +16,19 @@ from .overview import (
     size_text,
     smallest,
 )
-from .table3_runs import SIZE, run_steps
+from .table3_runs import run_steps
 from .warm_states import PRINTED
 
+SIZE = "quick"
 CAPS = {"max_iterations": 15, "max_cg_iterations": 300}        # of Gast15
+
+
+def run_costs(name, folder, count):
+    """Return ([`MethodCost`], [`Overview`]) of `count` steps evenly over a scene's run, whose
+    states are in a folder.
+    """
+    steps = (step for _, step in run_steps(name, SIZE, folder, count))
+    return costs_of_steps(name, steps, CAPS)
 
 
 @experiment("hot.fig15-runs", title="Speed-up overview over entire runs",
@@ -30,8 +39,7 @@ def speedups_over_runs(run):
     compile_methods(METHODS)
     rows, table = [], {}
     for name in run.progress(names, "scenes"):
-        steps = run_steps(name, SIZE, run.folder / "states", count)
-        step_costs, overviews = costs_of_steps(name, (step for _, step in steps), CAPS)
+        step_costs, overviews = run_costs(name, run.folder / "states" / SIZE, count)
         rows += step_costs
         table[name] = {o.method: o for o in overviews}
         for o in overviews:

@@ -101,7 +101,7 @@ def run(scene, patience, file=None):
 
 
 class Observers(NamedTuple):
-    """What is kept of a run: its `Log`, and its `RunStates` or None."""
+    """The `Log` of a run, and its `RunStates` or None."""
 
     log: object
     states: RunStates | None

@@ -1,8 +1,8 @@
 """Table 3 over entire runs: the work of projected Newton depends on where in its motion a scene is.
 
 `table3` measures five steps of each scene once its contact or pull has begun. Here each scene runs
-by HOT to its end, at the size of the quick profile, and the steps that are measured lie evenly over
-the run, as the paper's means do. With so few particles they are no reproduction.
+by HOT to its end, and the steps that are measured lie evenly over the run, as the paper's means do.
+With fewer particles than the paper's they are no reproduction.
 """
 
 from functools import partial
@@ -16,10 +16,9 @@ from ..common.registry import experiment
 from .one_step import implicit_step, solve_step
 from .run_history import unpublished
 from .run_states import RunStates, even_times
-from .table3 import METHODS, cost
+from .table3 import METHODS, RowCost, cost
 from .warm_states import PRINTED, next_step_length, scene, take_step
 
-SIZE = "quick"
 COLUMNS = ("scene", "t", "dt", "particles", "preconditioner", "newton", "cg", "converged")
 
 
@@ -57,17 +56,17 @@ def run_steps(name, size, folder, count):
     return steps_evenly(problem, states)
 
 
-def measure(name, steps):
-    """Return ({preconditioner: `RowCost`}, rows of COLUMNS) of steps (see `steps_evenly`)."""
+def measure(name, size, folder, count):
+    """Return ({preconditioner: values of a `RowCost`}, rows of COLUMNS) of `run_steps`."""
     advanced, rows, by_method = 0.0, [], {short: [] for short in METHODS}
-    for state, step in steps:
-        advanced, size = advanced + step.dt, step.particles
+    for state, step in run_steps(name, size, folder, count):
+        advanced, particles = advanced + step.dt, step.particles
         for short, method in METHODS.items():
             report = solve_step(step, method).report
             by_method[short].append(report)
-            rows.append((name, state.t, step.dt, size, short, report.iterations,
+            rows.append((name, state.t, step.dt, particles, short, report.iterations,
                          report.cg_iterations, report.converged))
-    return {short: cost((name, short, size), reports, advanced)
+    return {short: [*cost((name, short, particles), reports, advanced)]
             for short, reports in by_method.items()}, rows
 
 
@@ -78,9 +77,10 @@ def table3_runs(run):
     names, count = run.choose(quick=(("faceless",), 2), standard=(PRINTED, 10))
     table = []
     for name in run.progress(names, "scenes"):
-        costs, rows = measure(name, run_steps(name, SIZE, run.folder / "states", count))
+        costs, rows = run.cached(name, partial(measure, name, run.profile, run.folder / "states",
+                                               count))
         table += rows
-        for short, mean in costs.items():
+        for short, mean in ((short, RowCost(*values)) for short, values in costs.items()):
             few, most = np.quantile([row[6] for row in rows if row[4] == short], (0.0, 1.0))
             run.record(f"hot.table3.{name}.{short}.cg_iters.small", mean.cg,
                        scale=f"up to {mean.particles} particles, {mean.steps} steps evenly over "

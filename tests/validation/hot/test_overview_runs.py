@@ -6,7 +6,7 @@ import pytest
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 from validation.common.scenes import catalogue_scene, with_
-from validation.hot import overview, overview_runs
+from validation.hot import overview, overview_runs, table3_runs
 from validation.hot import warm_states as states
 
 
@@ -30,10 +30,10 @@ def test_measured_steps_end_where_a_block_enters():
     assert min(abs(t - 0.24) for t in ends) < 1e-12
 
 
-def test_every_method_solves_steps_over_the_run(monkeypatch):
+def test_every_method_solves_steps_over_the_run(monkeypatch, tmp_path):
     monkeypatch.setattr(overview, "METHODS", ("hot", "pn-pcg"))
-    monkeypatch.setattr(overview_runs, "scene", lambda name, size: poured(12))
-    rows, (hot, pcg) = overview_runs.run_costs("sauce", 3)
+    monkeypatch.setattr(table3_runs, "scene", lambda name, size: poured(12))
+    rows, (hot, pcg) = overview_runs.run_costs("sauce", tmp_path, 3)
     assert [(row.method, row.step) for row in rows] == [
         (method, k) for k in range(3) for method in ("hot", "pn-pcg")]
     assert np.all(np.diff([row.t for row in rows[::2]]) > 0.1)
