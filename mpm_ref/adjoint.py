@@ -27,6 +27,7 @@ from .core.surface import AT_NODES
 from .explicit import damp, scatter
 from .materials import NoFlow
 from .materials.learned.guard import is_guarded
+from .materials.learned.network import has_single_layers
 
 
 class StepAdjoint:
@@ -139,6 +140,9 @@ def require_adjoint(body):
         if type(part) not in known:
             raise ValueError(f"body {body.name!r}: {type(part).__name__} has no adjoint here; "
                              f"expected one of {', '.join(sorted(c.__name__ for c in known))}")
+        if has_single_layers(part):
+            raise ValueError(f"body {body.name!r}: {type(part).__name__} has layers in single "
+                             'precision, which have no adjoint; leave out precision = "single"')
         if is_guarded(part):
             raise ValueError(f"body {body.name!r}: {type(part).__name__} cuts its strains to a "
                              "box, which has no adjoint; expected learned laws without a guard")

@@ -213,7 +213,8 @@ def leaf(function):
 def borrowing(function):
     """Compile a formula as a `leaf` that borrows the arrays of its arguments: it does not count
     references to them, which takes longer than what it computes, and more so where threads share
-    the counters. The compiler refuses one that makes an array or returns a new one.
+    the counters. The compiler refuses one that makes an array. It must not return an array, not
+    even one of its arguments or a part of it, which the caller would then free: nothing checks it.
     """
     return Kernel(function, forceinline=True, _nrt=False)
 

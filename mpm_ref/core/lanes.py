@@ -6,8 +6,8 @@ one, as those of scalars are, so that they have the same bits on every processor
 """
 
 from llvmlite import ir
-from numba.core import cgutils, types
-from numba.core.errors import RequireLiteralValue
+from numba.core import types
+from numba.core.errors import NumbaTypeError, RequireLiteralValue
 from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import populate_array
 
@@ -34,12 +34,14 @@ def lanes(context, a, start, count):
     """Return the `Lanes` of `count` entries, a constant, of a contiguous array from `start` on.
     Nothing checks that the array has them.
     """
+    _require_contiguous(a, a.dtype)
     return Lanes(a.dtype, _constant(count))(a, types.intp, count), _load
 
 
 @intrinsic
 def lanes_as(context, like, a, start):
-    """Return the `Lanes` of an array from `start` on, as many as those of `like`."""
+    """Return the `Lanes` of a contiguous array from `start` on, as many as those of `like`."""
+    _require_contiguous(a, like.dtype)
     return like(like, a, types.intp), lambda context, builder, signature, arguments: _load(
         context, builder, signature.return_type(*signature.args[1:]), arguments[1:])
 
@@ -47,6 +49,8 @@ def lanes_as(context, like, a, start):
 @intrinsic
 def put_lanes(context, a, start, values):
     """Set the entries of a contiguous array from `start` on to `Lanes`."""
+    _require_contiguous(a, values.dtype)
+
     def code(context, builder, signature, arguments):
         place, alignment = _place(context, builder, (a, values), arguments)
         builder.store(arguments[2], place, align=alignment)
@@ -71,13 +75,14 @@ def plus_product(context, z, a, w):
 @intrinsic(prefer_literal=True)
 def stack(context, like, n):
     """Return an array of n numbers, a constant, of the type of `like`: room on the stack of the
-    kernel that calls, with any content, and gone when it returns.
+    kernel that calls, with any content, and gone when it returns: it must not be returned.
     """
     count, kind = _constant(n), types.Array(like, 1, "C")
 
     def code(context, builder, signature, arguments):
         one, length = context.get_data_type(like), ir.Constant(ir.IntType(64), count)
-        room = cgutils.alloca_once(builder, ir.ArrayType(one, count))
+        with builder.goto_entry_block():        # in a loop it would grow the stack
+            room = builder.alloca(ir.ArrayType(one, count))
         size = ir.Constant(ir.IntType(64), context.get_abi_sizeof(one))
         array = context.make_array(kind)(context, builder)
         populate_array(array, builder.bitcast(room, one.as_pointer()), [length], [size], size, None)
@@ -95,6 +100,12 @@ def is_single(context, a):
         return ir.Constant(ir.IntType(1), int(answer))
 
     return types.boolean(a), code
+
+
+def _require_contiguous(a, dtype):
+    """Raise TypingError unless an array is contiguous, and of a type of numbers."""
+    if a.layout != "C" or a.dtype != dtype:
+        raise NumbaTypeError(f"lanes of {a}: expected a contiguous array of {dtype}")
 
 
 def _constant(kind):

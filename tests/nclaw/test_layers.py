@@ -8,6 +8,7 @@ import neural_toys
 import numpy as np
 import pytest
 from neural_toys import CORRECTIONS, STRESSES, UNIT, deformations, trained
+from numba.core.errors import TypingError
 from numba.core.runtime import _nrt_python, rtsys
 from problems import DX, run_python, stepped
 from problems import digest as digest_of
@@ -15,6 +16,7 @@ from scipy.special import erf as erfs
 from small_runs import block
 
 from mpm_ref.core.jit import kernel
+from mpm_ref.core.lanes import lanes, put_lanes
 from mpm_ref.core.tensor import mat, put_mat
 from mpm_ref.explicit import Scheme, deform_body
 from mpm_ref.materials.learned import layers, learned_flow, learned_law, network, weights
@@ -253,6 +255,35 @@ def test_laws_that_have_no_single_precision_are_refused():
         learned_law(admissible_toys.energetic(), "single")
     with pytest.raises(ValueError, match="kind Contraction compute in double alone"):
         learned_flow(admissible_toys.contraction(), "single")
+
+
+@pytest.mark.parametrize(("shapes", "biases"), [
+    ([(13, 5), (5, 17)], (5, 17)), ([(18, 5), (5, 9)], (5, 9)), ([(13, 5), (6, 9)], (5, 9)),
+    ([(13, 5), (5, 9)], (5, 8)), ([(7, 5), (5, 9)], (5, 9)), ([], ())])
+def test_layers_that_do_not_fit_are_refused(shapes, biases):
+    """Kernels read and write as many numbers as sizes say."""
+    given = [(np.zeros(shape), np.zeros(m)) for shape, m in zip(shapes, biases)]
+    for deploy, kind in ((learned_law, STRESSES[0]()), (learned_flow, CORRECTIONS[0]())):
+        with pytest.raises(ValueError, match="expected layers that fit, from 7 to 4 or 13 to 9"):
+            deploy(weights.LawWeights(tuple(given), kind))
+
+
+@kernel
+def first_lanes(a):
+    put_lanes(a, 0, lanes(a, 0, 8))
+
+
+@kernel
+def lanes_of_other_numbers(a, b):
+    put_lanes(b, 0, lanes(a, 0, 8))
+
+
+def test_lanes_are_of_contiguous_arrays_of_one_type():
+    first_lanes(np.zeros(8))
+    with pytest.raises(TypingError, match="expected a contiguous array"):
+        first_lanes(np.zeros(16)[::2])
+    with pytest.raises(TypingError, match="expected a contiguous array of float64"):
+        lanes_of_other_numbers(np.zeros(8), np.zeros(8, np.float32))
 
 
 def scene_of(folder, material, dim=2):

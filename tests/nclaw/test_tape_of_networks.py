@@ -11,7 +11,7 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, NoFlow
 from mpm_ref.materials.learned.guard import StrainBox, guarded
-from mpm_ref.materials.learned.network import build_flow, build_law
+from mpm_ref.materials.learned.network import build_flow, build_law, with_single_layers
 from mpm_ref.materials.learned.response import (
     Correction,
     PlainCorrection,
@@ -132,3 +132,12 @@ def test_a_law_with_a_guard_is_refused():
     stepper.start((cut,))
     with pytest.raises(ValueError, match="NeuralStress cuts its strains to a box, which has no"):
         Tape(stepper, (cut,))
+
+
+def test_layers_in_single_precision_are_refused():
+    body, _ = bodies_of(CASES["plane"])
+    stepper = Stepper(Scheme(transfer="apic"), DX, 2, np.zeros(2))
+    single = body._replace(law=with_single_layers(body.law))
+    stepper.start((single,))
+    with pytest.raises(ValueError, match="NeuralStress has layers in single precision, which"):
+        Tape(stepper, (single,))

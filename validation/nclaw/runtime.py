@@ -48,7 +48,7 @@ def table3(run):
                 cpu = record(run, (name, word), times, steps)
                 single += [cpu] * (word == SINGLE)
     if single:
-        run.record(f"nclaw.table3.{SINGLE}.cpu", max(single), unit="s", comparator="<=",
+        run.record(f"nclaw.table3.{SINGLE}.cpu", np.max(single), unit="s", comparator="<=",
                    bound=MOST_CPU, scale=f"1000 particles, {steps} steps",
                    note=f"CPU time of a step, per particle, the largest of {len(single)}")
     run.table("times", COLUMNS, rows)

@@ -136,6 +136,11 @@ def with_single_layers(law):
     return law._replace(W=law.W.astype(np.float32), b=law.b.astype(np.float32))
 
 
+def has_single_layers(law):
+    """Return whether a law or a flow has layers that compute in single precision."""
+    return getattr(law, "W", np.empty(0)).dtype == np.float32
+
+
 def moduli_of(law):
     """Return the `NeuralLaw.wave` and `NeuralLaw.largest`, of its tangents at rest: along the
     stiffest axis, and the norm of the whole map from strains to stresses. Pull and push differ,

@@ -5,6 +5,7 @@ no layers and are the law themselves.
 """
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 from ...core.precision import PRECISIONS
@@ -87,6 +88,7 @@ def _learned(table, weights, precision):
     if precision not in PRECISIONS:
         raise ValueError(f"precision = {precision!r}: expected {' or '.join(PRECISIONS)}")
     entry = _entry(table, weights.kind)
+    require_sizes(weights, entry.ends)
     law = entry.build(weights)
     if precision == "double":
         return law
@@ -94,6 +96,19 @@ def _learned(table, weights, precision):
         raise ValueError(f'precision = "single": laws of kind {type(weights.kind).__name__} '
                          'compute in double alone; expected "double"')
     return entry.in_single(law)
+
+
+def require_sizes(weights, ends):
+    """Raise ValueError unless the layers of `LawWeights` fit, one to the next, and the first and
+    the last to one of the pairs `ends`, if there are any: kernels do not check it.
+    """
+    sizes = [W.shape for W, _ in weights.layers]
+    fits = (all(after[0] == before[1] for before, after in pairwise(sizes))
+            and all(b.shape == (W.shape[1],) for W, b in weights.layers))
+    if ends and not (sizes and fits and (sizes[0][0], sizes[-1][1]) in ends):
+        wanted = " or ".join(f"{n} to {m}" for n, m in sorted(ends))
+        raise ValueError(f"a law of kind {type(weights.kind).__name__} with layers of sizes "
+                         f"{sizes}: expected layers that fit, from {wanted} numbers")
 
 
 def is_identified(part, kind):

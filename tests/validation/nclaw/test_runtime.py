@@ -79,6 +79,21 @@ def test_times_in_single_precision_have_ids_and_a_bound_of_their_own(tmp_path, r
     assert (most.value, most.bound, verdict(most)) == (pytest.approx(1.1e-6), 1.2e-6, "pass")
 
 
+def test_a_broken_run_in_single_precision_misses_the_bound(tmp_path, runs, monkeypatch):
+    """Whichever of the materials it is."""
+    timed, steps = runtime.record, iter([1e-6, np.nan])
+    monkeypatch.setattr(runtime, "trained", lambda name: untrained())
+    monkeypatch.setattr(runtime, "methods", lambda name, models: (
+        {"single": copy_body} if name in ("jelly", "sand") else {}))
+
+    def broken(*arguments):
+        timed(*arguments)
+        return next(steps)
+
+    monkeypatch.setattr(runtime, "record", broken)
+    assert verdict(recorded(tmp_path)["nclaw.table3.single.cpu"]) == "miss"
+
+
 def test_what_is_not_trained_is_told_and_not_run(tmp_path, runs):
     found = recorded(tmp_path)
     assert found["nclaw.table3.untrained"].value == 6
