@@ -60,7 +60,7 @@ def printed_bodies(run, name, scene):
 def record_run(run, name, scene, patience):
     """Record a run of a scene, for `patience` CPU seconds at most, or its stored history."""
     file = run.folder / "states" / f"{name}.npz"
-    history = run_history(scene, file, patience)
+    history = run_history(scene, file, patience, with_states=run.profile == "standard")
     run.table("steps", COLUMNS, history.steps[evenly(len(history.steps), ROWS)].tolist())
     record_end(run, name, history)
     record_cost(run, name, history)

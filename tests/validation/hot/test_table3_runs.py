@@ -57,7 +57,7 @@ def test_steps_from_states_on_disk_are_those_of_the_run(tmp_path, missing, monke
 
 def test_whole_run_leaves_the_states_that_steps_are_measured_from(tmp_path, monkeypatch):
     problem = build(small(20))
-    run_history(small(20), tmp_path / "bust.npz", 1e3)
+    run_history(small(20), tmp_path / "bust.npz", 1e3, with_states=True)
     states = RunStates(tmp_path, "bust", even_times(problem))
     monkeypatch.setattr(table3_runs, "take_step", lambda *_: pytest.fail("it is on disk"))
     stored = [(state.step, step.dt) for state, step in steps_evenly(problem, states)]
