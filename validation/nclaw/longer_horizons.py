@@ -19,7 +19,16 @@ from ..common.weights_needed import load_available
 from .environments import ENVIRONMENTS
 from .errors import COLUMNS, errors, grouped, scale
 from .printed_ids import error_id
-from .trained_laws import SEEDS, identity, nets, stored, trained, weights_of
+from .trained_laws import (
+    COMMAND,
+    SEEDS,
+    file_digest,
+    identity,
+    nets,
+    stored,
+    trained,
+    weights_of,
+)
 
 OURS, LONGER, ADMISSIBLE = "ours", "longer", "admissible"
 PARTS = {"epochs": 40, "first": 500, "last": 1500}      # two segments, and one in the later half
@@ -45,8 +54,16 @@ def longer_nets():
 
 @cache
 def longer_laws(name):
-    """Return the `LearnedLaws` of a name; raises as `trained_laws.trained`."""
-    return stored(name, identity(longer_nets()[name]))
+    """Return the `LearnedLaws` of a name; raises as `trained_laws.trained`, and where they went on
+    from other weights than those that are there.
+    """
+    net = longer_nets()[name]
+    laws = stored(name, identity(net))
+    start = laws.about.get("start_sha256")      # of trainings since it is noted
+    if start not in (None, file_digest(net.start)):
+        raise ValueError(f"{name}.npz goes on from other weights than {net.start}.npz: train it "
+                         f"again, {COMMAND} {name}")
+    return laws
 
 
 @experiment("nclaw.longer", title="NCLaw: longer horizons after the printed training",

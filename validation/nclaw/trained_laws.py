@@ -104,6 +104,11 @@ def stored(name, expected, load=weights.load):
     return load_weights(path, expected, load, f"{COMMAND} {name}", reason)
 
 
+def file_digest(name):
+    """Return the sha256 of the file of weights of a name."""
+    return hashlib.sha256((FOLDER / f"{name}.npz").read_bytes()).hexdigest()
+
+
 def identity(net):
     """Return the plain values that identify a training."""
     settings = {name: value for name, value in net._asdict().items()

@@ -27,7 +27,15 @@ from ..nclaw.longer_horizons import longer_nets
 from ..nclaw.simulators import GraphNet, framed_run, scenes_of
 from ..nclaw.small_trainings import Small, small_nets
 from ..nclaw.strain_bounds import bounds
-from ..nclaw.trained_laws import FOLDER, diverged_path, identity, nets, store_diverged, trained
+from ..nclaw.trained_laws import (
+    FOLDER,
+    diverged_path,
+    file_digest,
+    identity,
+    nets,
+    store_diverged,
+    trained,
+)
 from .common import CHECKPOINTS, Checkpoints, Folder, Names, Threads, origin, times, train_all
 from .dough import filmed_laws
 from .small import bundled
@@ -49,6 +57,11 @@ def untrained_laws(net):
     return train.initial_laws(net.method, net.seed, kinds, material)
 
 
+def origin_of_start(net):
+    """Return the digest of the weights from which a `LawNet` goes on, by its name in the record."""
+    return {"start_sha256": file_digest(net.start)} if net.start else {}
+
+
 def train_net(net, recipe, laws, checkpoint, show):
     """Train `laws` by the method of a net; return the session."""
     run = build(environment(net.environment)), trajectory(net.environment)
@@ -67,7 +80,8 @@ def trained_laws(name, net, checkpoints, threads):
     """
     path, recipe = checkpoints / f"{name}.pt", recipe_of(net)
     laws, errors, steps = untrained_laws(net), [], environment(net.environment).steps
-    about = {**identity(net), "recipe": asdict(recipe), "threads": threads, **origin("nclaw", name)}
+    about = {**identity(net), **origin_of_start(net), "recipe": asdict(recipe), "threads": threads,
+             **origin("nclaw", name)}
     with tqdm(total=recipe.epochs, desc=name) as bar:
         def show(history):
             errors[:] = [epoch.error for epoch in history]

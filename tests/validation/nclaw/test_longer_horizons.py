@@ -5,9 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mpm_ref.materials.learned.weights import LearnedLaws
+from validation.nclaw import longer_horizons
 from validation.nclaw.errors import ErrorRow
 from validation.nclaw.longer_horizons import STARTS, by_kind, longer_nets, record_task
-from validation.nclaw.trained_laws import identity, nets
+from validation.nclaw.trained_laws import file_digest, identity, nets
 
 ROWS = [ErrorRow(method, "water", "velocity", draw, error, -1, "")
         for method, own in {"ours": (1.0, 3.0), "ours-seed-1": (8.0, 8.0),
@@ -28,6 +30,14 @@ def test_each_goes_on_from_weights_of_its_environment_and_seed():
         assert identity(net)["start"] == net.start
     assert len(longer_nets()) == len(STARTS)
     assert sorted(net.seed for net in longer_nets().values()) == [*8 * [0], 1, 2]
+
+
+def test_laws_that_went_on_from_other_weights_are_refused(monkeypatch):
+    laws = LearnedLaws(None, None, {"start_sha256": file_digest("water")})
+    monkeypatch.setattr(longer_horizons, "stored", lambda name, expected: laws)
+    assert longer_horizons.longer_laws.__wrapped__("water-longer") is laws
+    with pytest.raises(ValueError, match=r"water-seed-1-longer.npz goes on from other weights"):
+        longer_horizons.longer_laws.__wrapped__("water-seed-1-longer")
 
 
 def test_identities_of_other_trainings_stay():
