@@ -11,7 +11,9 @@ A gradient begins with the initial state and ends with the two arrays; it includ
 forward. Ours makes new particles, sorts them and keeps the states of all steps; Taichi and Warp
 write into arrays of all steps, of particles and nodes, that were allocated before. The runs without
 a gradient are those of `blocks`, which keep one state. Every run has a process of its own, and
-they are timed in turn.
+they are timed in turn. Memory is what the process grew by: the difference of two sizes is free of
+the code of the backend. The CPU time of the first gradient has the compilation, unless the caches
+have it.
 """
 
 import time

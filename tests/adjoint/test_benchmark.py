@@ -37,7 +37,7 @@ def found(x_bar):
 
 
 def test_disagreement_is_relative_to_the_largest_entry_of_the_first():
-    assert disagreement({"a": found([1.0, -4.0]), "b": found([2.0, -4.0])}) == 0.25
+    assert disagreement({"a": found([1.0, -4.0]), "b": found([2.0, -5.0])}) == 0.25
     assert disagreement({"a": found([1.0])}) == 0.0
 
 
