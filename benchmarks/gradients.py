@@ -4,8 +4,8 @@ initial positions and velocities of the block.
 The loss is sum_p w_p . x_p(end) with fixed random w. All backends differentiate the steps that
 `blocks` measures, with fixed corotated elasticity. Its stress needs the rotation of F. Taichi and
 Warp compute it by five of Newton's iterations, with and without a gradient, and their tapes go
-through them: their singular value decompositions have no gradient where singular values are equal,
-as they are at rest. Ours has its gradient in closed form.
+through them. Taichi 1.7.4 refuses to differentiate its singular value decomposition, and the
+gradient through that of Warp 1.19.0 is wrong at F = I. Ours has its gradient in closed form.
 
 A gradient begins with the initial state and ends with the two arrays; it includes the steps
 forward. Ours makes new particles, sorts them and keeps the states of all steps; Taichi and Warp

@@ -2,8 +2,7 @@
 steps, for particles and nodes, since the tape reads the values of each step on its way back.
 
 The rotation in the stress comes of a fixed number of Newton's iterations, which Taichi
-differentiates; the gradient of its singular value decomposition is not a number where singular
-values are equal.
+differentiates; it refuses its singular value decomposition.
 """
 
 import numpy as np

@@ -2,8 +2,8 @@
 steps, for particles and nodes, since the tape reads the values of each step on its way back.
 
 The rotation in the stress comes of a fixed number of Newton's iterations, which Warp
-differentiates; the gradient of its singular value decomposition is not a number where singular
-values are equal.
+differentiates; the gradient through its singular value decomposition is wrong at F = I, and loses
+digits near it.
 """
 
 import warp as wp
