@@ -57,6 +57,7 @@ figures: $(READY) ## draw the figures again from the results of PROFILE (default
 bench: $(READY)  ## our kernels beside Taichi and Warp (installs both), features, implicit steps
 	$(PIP) install -c constraints.txt -e '.[bench]'
 	$(PY) -m benchmarks blocks
+	$(PY) -m benchmarks gradients
 	$(PY) -m benchmarks features
 	$(PY) -m benchmarks hot
 	$(PY) -m benchmarks hot-runs

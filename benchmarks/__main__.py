@@ -1,7 +1,8 @@
 """Run the benchmarks: `python -m benchmarks COMMAND`.
 
-They compare mpm_ref with Taichi and Warp on an elastic block, measure the cost of each feature
-and of an implicit step, time a sweep on several workers, and simulate many workers.
+They compare mpm_ref with Taichi and Warp on an elastic block, forward and with a gradient, measure
+the cost of each feature and of an implicit step, time a sweep on several workers, and simulate
+many workers.
 """
 
 import json
@@ -37,12 +38,12 @@ def compare(problem, names, threads, repeats):
     The backends are timed in turn.
     """
     backends = {name: RemoteBackend(name, problem, threads) for name in names}
-    energies = {name: backend.step(WARM_UP)[2] for name, backend in backends.items()}
+    energies = {name: backend.run(WARM_UP)[2] for name, backend in backends.items()}
     per_round = max(1, round(300_000 / len(problem.x)))
     rounds = {name: [] for name in names}
     for _ in range(repeats):
         for name, backend in backends.items():
-            rounds[name].append(backend.step(per_round)[:2])
+            rounds[name].append(backend.run(per_round)[:2])
     for backend in backends.values():
         backend.close()
     scale = 1e9 / (per_round * len(problem.x))
@@ -112,6 +113,27 @@ def without_out(arguments):
         k = kept.index("--out")
         del kept[k:k + 2]
     return [one for one in kept if not one.startswith("--out=")]
+
+
+@app.command()
+def gradients(
+    sizes: Annotated[str, typer.Option(help="of 10k, 100k, 1M, comma-separated")] = "10k,100k",
+    backends: Annotated[str, typer.Option()] = "mpm_ref,taichi,warp",
+    steps: Annotated[int, typer.Option(help="through which a gradient goes")] = 8,
+    threads: Annotated[int, typer.Option()] = 2,
+    repeats: Annotated[int, typer.Option()] = 9,
+    out: Annotated[Path, typer.Option()] = Path("results/benchmarks/gradients.json"),
+):
+    """Measure ns per particle-step of runs with a gradient and without one, of every backend."""
+    from .gradients import gradient_line, gradient_rows
+
+    rows = []
+    for size in sizes.split(","):
+        problem = block(CELLS[size])
+        for row in gradient_rows(problem, backends.split(","), steps, threads, repeats):
+            rows.append({"size": size} | row)
+            typer.echo(gradient_line(rows[-1]))
+    save(out, rows, threads, repeats)
 
 
 @app.command()

@@ -32,9 +32,9 @@ def serve(pipe, name, problem, threads):
 
 
 class RemoteBackend:
-    """A backend in a process of its own."""
+    """A backend in a process of its own, which answers there as `serve` does."""
 
-    def __init__(self, name, problem, threads):
+    def __init__(self, name, problem, threads, serve=serve):
         context = get_context("spawn")
         self.pipe, end = context.Pipe()
         self.process = context.Process(target=serve, args=(end, name, problem, threads),
@@ -42,11 +42,11 @@ class RemoteBackend:
         self.process.start()
         end.close()
 
-    def step(self, steps):
-        """Return the wall and CPU seconds of a number of steps, and the kinetic energy after them
-        [J].
+    def run(self, count):
+        """Return the answer to a number: of `serve` the wall and CPU seconds of that many steps,
+        and the kinetic energy after them [J].
         """
-        self.pipe.send(steps)
+        self.pipe.send(count)
         return self.pipe.recv()
 
     def close(self):
