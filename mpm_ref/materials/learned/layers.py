@@ -4,18 +4,20 @@
 
 Every sum starts at its bias and goes over the inputs in their order. Two blocks of 32 outputs, of 8
 in layers of fewer, run side by side: where there are vector registers for them, as with AVX-512,
-nothing is stored before their sums are complete. The last block ends at the last output, so that it may compute some outputs once more, to
-the same bits. Layers of fewer than 8 outputs are summed in memory. No point allocates anything, nor
-counts references, unless a layer is wider than the room on the stack.
+nothing is stored before their sums are complete. The last block ends at the last output, so that it
+may compute some outputs once more, to the same bits. Layers of fewer than 8 outputs are summed in
+memory. No point allocates anything, nor counts references, unless a layer is wider than the room on
+the stack.
 
 In double, gelu(z) = z (1 + erf(z / sqrt 2)) / 2 as the C library has it. In single it is
 
     gelu(z) = z (1/2 + x P(t) / Q(t)),    x = min(max(z, -FAR), FAR),    t = max(|x|, NEAR)^2
 
-for which the compiler uses vector registers, too: no branch, no call. P and Q are our own fit of
-x P / Q to erf(x / sqrt 2) / 2 on [0, FAR], by least squares whose weights grow where errors are
-large; its largest error is 8e-9, and 1.9e-7 as computed in single, that of gelu |z| times as much. NEAR is far below what t adds to
-P and Q. Near rest, without it, terms of P would be subnormal numbers, which take many times as long.
+for which the compiler uses vector registers, too: no branch, no call. P and Q are our own fit of x
+P / Q to erf(x / sqrt 2) / 2 on [0, FAR], by least squares whose weights grow where errors are
+large; its largest error is 8e-9, and 1.9e-7 as computed in single, that of gelu |z| times as much.
+NEAR is far below what t adds to P and Q. Near rest, without it, terms of P would be subnormal
+numbers, which take many times as long.
 """
 
 from math import erf, sqrt
