@@ -3,6 +3,7 @@ disturb another one.
 """
 
 import time
+from contextlib import suppress
 from multiprocessing import get_context
 
 import numpy as np
@@ -51,5 +52,6 @@ class RemoteBackend:
 
     def close(self):
         """End the process."""
-        self.pipe.send(None)
+        with suppress(OSError):         # of a process that has ended by itself
+            self.pipe.send(None)
         self.process.join()

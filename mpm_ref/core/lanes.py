@@ -61,7 +61,10 @@ def put_lanes(context, a, start, values):
 
 @intrinsic
 def plus_product(context, z, a, w):
-    """Return z + a w of `Lanes` z and w and a number a."""
+    """Return z + a w of `Lanes` z and w, alike, and a number a."""
+    if w != z:
+        raise NumbaTypeError(f"lanes {w}: expected {z}")
+
     def code(context, builder, signature, arguments):
         z, a, w = arguments
         lane, every = ir.IntType(32), ir.VectorType(ir.IntType(32), w.type.count)

@@ -71,7 +71,7 @@ def measure(name, size, folder, count):
 
 
 @experiment("hot.table3-runs", title="Newton's CG iterations over entire runs",
-            profiles=("quick", "standard"), budget={"quick": 12, "standard": 900})
+            profiles=("quick", "standard"), budget={"quick": 12, "standard": 4000})
 def table3_runs(run):
     """Record mean CG iterations of a step by both preconditioners, and those of each step."""
     names, count = run.choose(quick=(("faceless",), 2), standard=(PRINTED, 10))

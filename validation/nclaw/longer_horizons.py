@@ -39,10 +39,10 @@ STARTS = (*ENVIRONMENTS, *(f"water-seed-{seed}" for seed in SEEDS),
 
 
 class Pair(NamedTuple):
-    """A training as printed and the one that goes on from it, by their names."""
+    """The laws of a training as printed, and of the one that goes on from it."""
 
-    printed: str
-    longer: str
+    printed: object     # `LearnedLaws`
+    longer: object
 
 
 def longer_nets():
@@ -60,14 +60,14 @@ def longer_laws(name):
     net = longer_nets()[name]
     laws = stored(name, identity(net))
     start = laws.about.get("start_sha256")      # of trainings since it is noted
-    if start not in (None, file_digest(net.start)):
+    if start is not None and start != file_digest(net.start):
         raise ValueError(f"{name}.npz goes on from other weights than {net.start}.npz: train it "
                          f"again, {COMMAND} {name}")
     return laws
 
 
 @experiment("nclaw.longer", title="NCLaw: longer horizons after the printed training",
-            profiles=("quick", "standard"), budget={"quick": 20, "standard": 900})
+            profiles=("quick", "standard"), budget={"quick": 20, "standard": 1500})
 def longer_horizons(run):
     """Record errors of the laws as printed and of those that went on, in the same runs."""
     pairs = available_pairs(run)

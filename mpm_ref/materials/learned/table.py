@@ -103,12 +103,13 @@ def require_sizes(weights, ends):
     the last to one of the pairs `ends`, if there are any: kernels do not check it.
     """
     sizes = [W.shape for W, _ in weights.layers]
-    fits = (all(after[0] == before[1] for before, after in pairwise(sizes))
+    fits = (all(len(size) == 2 for size in sizes)
+            and all(after[0] == before[1] for before, after in pairwise(sizes))
             and all(b.shape == (W.shape[1],) for W, b in weights.layers))
     if ends and not (sizes and fits and (sizes[0][0], sizes[-1][1]) in ends):
-        wanted = " or ".join(f"{n} to {m}" for n, m in sorted(ends))
+        wanted = " or ".join(f"{n} numbers and the last to give {m}" for n, m in sorted(ends))
         raise ValueError(f"a law of kind {type(weights.kind).__name__} with layers of sizes "
-                         f"{sizes}: expected layers that fit, from {wanted} numbers")
+                         f"{sizes}: expected each to fit the next, the first to read {wanted}")
 
 
 def is_identified(part, kind):
