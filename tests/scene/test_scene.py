@@ -191,7 +191,7 @@ def test_every_parameter_of_the_tables_is_a_key():
     flows = {name for entry in materials.FLOWS.values()
              for name in signature(entry.build).parameters}
     assert laws == set(Material.__struct_fields__) - {"law", "flow", "weights", "sha256",
-                                                      "guard"}
+                                                      "guard", "precision"}
     assert flows - {"dim"} == set(Flow.__struct_fields__) - {"name"}
 
 

@@ -116,15 +116,15 @@ def by_kind(rows):
     return found
 
 
-def record_task(run, task, method, found):
+def record_task(run, task, method, seed_errors):
     """Record the medians of a task, (environment, task), over the seeds of a method: the error with
-    longer horizons against the printed one, and over that without. found: as of `by_kind`.
+    longer horizons against the printed one, and over that without. seed_errors: as of `by_kind`.
     """
     short, (name, what) = run.profile == "quick", task
     trained_on = what == "reconstruction"
     printed = targets.load().get(error_id(
         "nclaw.table1" if trained_on else "nclaw.table2", OURS, name, what, ()))
-    before, after = (found[kind] for kind in kinds_of(method))
+    before, after = (seed_errors[kind] for kind in kinds_of(method))
     ours, longer = float(np.median(before)), float(np.median(after))
     rule = ({"comparator": "info"} if printed is None
             else {"comparator": "<=", "bound": printed.value})
