@@ -24,6 +24,7 @@ from ..nclaw import bundle
 from ..nclaw.dough import DoughNet, doughs
 from ..nclaw.environments import environment, trajectory
 from ..nclaw.longer_horizons import longer_nets
+from ..nclaw.seeds import seed_nets
 from ..nclaw.simulators import GraphNet, framed_run, scenes_of
 from ..nclaw.small_trainings import Small, small_nets
 from ..nclaw.strain_bounds import bounds
@@ -149,7 +150,7 @@ def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints 
         else:
             write(path, trained_laws(name, net, checkpoints, threads))
 
-    all_nets = {**nets(), **longer_nets(), **small_nets(), **doughs()}
+    all_nets = {**nets(), **seed_nets(), **longer_nets(), **small_nets(), **doughs()}
     train_all(names, all_nets, (folder, checkpoints), threads, make)
 
 
