@@ -17,6 +17,7 @@ from ..core.mls_slopes import mls_stencil
 from ..core.state import Grid
 from ..explicit import Stepper, scatter
 from .constraints import ActiveSet
+from .heap import keep_freed_memory
 from .methods import SolverOptions, minimise
 from .multigrid.geometric import CoarseGrids, coarse_conditions
 from .norms import characteristic_norms
@@ -63,6 +64,7 @@ class ImplicitStepper(Stepper):
         """Prepare the bodies, as `explicit.Stepper.start`. Raises ValueError for body forces of
         particles, and for a flow without potential where the options ask for one.
         """
+        keep_freed_memory()
         super().start(bodies)
         for body in bodies:
             check_return_map(body, self.options.return_map)
