@@ -1,7 +1,8 @@
 """Memory that implicit steps free and ask for again: matrices of hundreds of megabytes.
 
 By default the GNU C library returns large freed blocks to the operating system, which then clears
-their pages anew at the next step: 7 to 18 % of the CPU time of a step, and more by two threads.
+their pages anew at the next step: 8 to 15 % of the time of a step in two scenes of 115 000 and
+400 000 particles, 13 to 24 % by two threads.
 """
 
 import ctypes
