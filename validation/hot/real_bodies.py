@@ -100,6 +100,13 @@ def bodies_text(name):
     return f"bodies from meshes of the release: {files}"
 
 
+def with_real_bodies(name, scene, folder):
+    """Return a scene with the release's bodies where all its meshes are there, else as it is; see
+    `real_scene`.
+    """
+    return scene if absent(name) else real_scene(name, scene, folder)
+
+
 def filled(real, dx, seed, as_released=True):
     """Return a `RealBody` filled for a grid spacing dx [m] as a `FilledBody`."""
     file = mesh_file("hot", real.file, real.sha256)

@@ -2,7 +2,7 @@
 
 `table3` measures five steps of each scene once its contact or pull has begun. Here each scene runs
 by HOT to its end, and the steps that are measured lie evenly over the run, as the paper's means do.
-With fewer particles than the paper's they are no reproduction. One scene has the printed size.
+With fewer particles than the paper's they are no reproduction. Few scenes have the printed size.
 """
 
 from functools import partial
@@ -14,12 +14,13 @@ from mpm_ref.simulate import ended, simulate
 
 from ..common.registry import experiment
 from .one_step import implicit_step, solve_step
+from .real_bodies import bodies_text, with_real_bodies
 from .run_history import unpublished
 from .run_states import RunStates, even_times
 from .table3 import METHODS, RowCost, cost
-from .warm_states import PRINTED, next_step_length, scene, take_step
+from .warm_states import PRINTED, catalogue_name, next_step_length, scene, take_step
 
-AFFORDABLE = ("faceless",)      # scenes whose entire run at the printed size takes minutes
+AFFORDABLE = ("faceless", "wheel")      # whose entire run at the printed size is affordable
 COLUMNS = ("scene", "t", "dt", "particles", "preconditioner", "newton", "cg", "converged")
 
 
@@ -51,9 +52,14 @@ def march_to(problem, stepper, state, is_due):
 
 
 def run_steps(name, size, folder, count):
-    """Return the `steps_evenly` of a scene at a size, whose states are in a folder."""
-    problem = build(scene(name, size))
-    states = RunStates(unpublished(folder), name.removesuffix("_stiff"), even_times(problem, count))
+    """Return the `steps_evenly` of a scene at a size, whose states are in a folder; at the printed
+    size with the bodies of HOT's release where the user has their meshes.
+    """
+    record, folder = scene(name, size), unpublished(folder)
+    if size == "paper":
+        record = with_real_bodies(catalogue_name(name), record, folder)
+    problem = build(record)
+    states = RunStates(folder, name.removesuffix("_stiff"), even_times(problem, count))
     return steps_evenly(problem, states)
 
 
@@ -81,6 +87,8 @@ def table3_runs(run):
     smaller = () if run.profile == "paper" else ("small",)
     table = []
     for name in run.progress(names, "scenes"):
+        if run.profile == "paper":
+            run.note(f"{name}: {bodies_text(catalogue_name(name))}")
         costs, rows = run.cached(name, partial(measure, name, run.profile, run.folder / "states",
                                                count))
         table += rows

@@ -52,13 +52,17 @@ VERSIONS = 4            # of the package whose states stay on disk
 
 def scene(name, profile):
     """Return a scene of `START_TIMES` at a size, with HOT as its integrator."""
-    record = sized("hot_" + name.removesuffix("_soft").removesuffix("_stiff"), profile,
-                 integrator="hot", unstable="allow")
+    record = sized(f"hot_{catalogue_name(name)}", profile, integrator="hot", unstable="allow")
     if name != "armacat_soft":
         return record
     return with_(record, body=tuple(
         with_(body, material=with_(body.material, E=SOFT_CAT)) if body.name == "cat" else body
         for body in record.body))
+
+
+def catalogue_name(name):
+    """Return the name of a scene of `START_TIMES` without its stiffness, as of `sizes.SIZES`."""
+    return name.removesuffix("_soft").removesuffix("_stiff")
 
 
 def warm_state(name, profile, t=None):

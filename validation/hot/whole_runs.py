@@ -18,7 +18,7 @@ from ..common.even_points import even_subset
 from ..common.registry import experiment
 from ..common.scenes import evenly
 from ..ldm.published_bodies import keep
-from .real_bodies import BODIES, absent, bodies_text, real_scene
+from .real_bodies import BODIES, bodies_text, with_real_bodies
 from .run_history import COLUMNS, run_history, unpublished
 from .sizes import SIZES, sized
 from .table3_runs import AFFORDABLE
@@ -55,7 +55,7 @@ def scene_experiment(scene, seconds, quick=None):
 def printed_bodies(run, name, scene):
     """Return a scene with the release's bodies, where their meshes are there, and note which."""
     run.note(bodies_text(name))
-    return scene if absent(name) else real_scene(name, scene, unpublished(run.folder / "states"))
+    return with_real_bodies(name, scene, unpublished(run.folder / "states"))
 
 
 def is_measured(run, name):

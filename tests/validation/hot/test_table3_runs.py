@@ -83,7 +83,7 @@ def test_numbers_of_the_printed_size_alone_are_the_printed_ones(profile, end, tm
     rows = [("faceless", 0.0, 0.1, 9, short, 2, 30, True) for short in table3_runs.METHODS]
     run = SimpleNamespace(
         profile=profile, folder=tmp_path, choose=lambda **by: by[profile],
-        progress=lambda names, _: ["faceless"], table=lambda *_: None,
+        progress=lambda names, _: ["faceless"], table=lambda *_: None, note=lambda text: None,
         cached=lambda name, make: (dict(zip(table3_runs.METHODS, values, strict=True)), rows),
         record=lambda id, value, **rest: found.append((id, value)))
     table3_runs.table3_runs(run)
@@ -92,7 +92,18 @@ def test_numbers_of_the_printed_size_alone_are_the_printed_ones(profile, end, tm
 
 
 @pytest.mark.parametrize(("profile", "name", "kept"), [
-    ("quick", "faceless", False), ("standard", "wheel", True), ("paper", "faceless", True),
-    ("paper", "wheel", False)])
+    ("quick", "faceless", False), ("standard", "twist", True), ("paper", "faceless", True),
+    ("paper", "twist", False)])
 def test_states_are_kept_of_runs_whose_steps_are_measured(profile, name, kept):
     assert whole_runs.is_measured(SimpleNamespace(profile=profile), name) is kept
+
+
+def test_steps_at_the_printed_size_are_those_of_the_bodies_of_the_whole_run(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(table3_runs, "scene", lambda name, size: small(3))
+    monkeypatch.setattr(table3_runs, "with_real_bodies",
+                        lambda name, scene, folder: asked.append((name, folder)) or small(6))
+    for size, steps in (("standard", 3), ("paper", 6)):
+        times = [step.t for _, step in table3_runs.run_steps("armacat_stiff", size, tmp_path, 1)]
+        assert times[0] == pytest.approx(small(steps).end / 2, abs=small(steps).longest)
+    assert asked == [("armacat", tmp_path)]
