@@ -8,7 +8,7 @@ are options, of which the two methods are choices:
                LDM (LDM-alg2)                       NSF (NSF-sec5.2)
     field      a map, stress from its F             position, stress and affine field
     quadrature Lagrangian or Eulerian               points that share a node with a sample
-    transfer   PIC                                  APIC
+    transfer   PIC; ours also APIC and MLS-MPM      APIC
     velocity   dg/dxhat vhat (see `latent`)         difference of positions over the step
     projection of velocities, then positions        of positions (NSF-eq10)
 
@@ -72,7 +72,8 @@ class ReducedStepper:
     projection: object          # `projection.RateProjection` or `PositionInversion`
     gravity: np.ndarray         # (d,) [m/s^2]
     conditions: object = None   # with apply(grid, t, dt); see core.boundary
-    transfer: str = "pic"       # or "apic", with the field's affine velocity field
+    transfer: str = "pic"       # or "apic", "mls", with an affine velocity field: of the field, or
+                                # with rates the gradient of its velocity
     velocity: str = "previous"
     v0: np.ndarray | None = None
 
@@ -84,8 +85,16 @@ class ReducedStepper:
         if self.velocity not in VELOCITIES:
             raise ValueError(f"velocity = {self.velocity!r}: expected one of "
                              + ", ".join(VELOCITIES))
+        if self.has_gradient and self.velocity != "previous":
+            raise ValueError(f"velocity = {self.velocity!r} with transfer {self.transfer!r}: "
+                             "expected 'previous', whose gradient is known")
         self.scheme = Scheme(self.quadrature.degree, self.transfer)
         self.storage = Storage(self.quadrature.dx, self.scheme.stencil, d)
+
+    @property
+    def has_gradient(self):
+        """Whether the affine velocity field is the gradient of the map's velocity, with rates."""
+        return self.transfer != "pic" and isinstance(self.projection, RateProjection)
 
     def step(self, latent, samples, t, dt, weights=None):
         """Return the `Latent` and `Report` after a step from time t [s] by dt [s].
@@ -138,7 +147,10 @@ class ReducedStepper:
         """
         particles = particles_at(state.x, velocity(state), *sizes, transfer=self.transfer)
         particles.tau[:] = self.field.stress(state.points, latent.xhat, state.F)
-        if self.transfer == "apic":
+        if self.has_gradient:
+            particles.C[:] = self.field.velocity_gradient(state.points, latent.fitted_at,
+                                                          latent.vhat)
+        elif self.transfer == "apic":
             particles.C[:] = self.field.affine(state.points, latent.xhat)
         return Body("reduced", particles, None, NoFlow(), np.arange(len(state.x)))
 
@@ -165,10 +177,10 @@ class ReducedStepper:
 
 def ldm_stepper(g, quadrature, law, gravity, projection="linear", **options):
     """Return the `ReducedStepper` of LDM (LDM-alg2) on a deformation map g of a body of an elastic
-    law; projection: see `projection.RateProjection`; options: conditions and velocity.
+    law; projection: see `projection.RateProjection`; options: conditions, transfer and velocity.
     """
     return ReducedStepper(ElasticMap(g, law), quadrature, RateProjection(projection), gravity,
-                          transfer="pic", **options)
+                          **options)
 
 
 def nsf_stepper(fields, material, dx, degree, gravity, inversion="nonlinear", **options):

@@ -13,6 +13,7 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, NoFlow
 from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.fields.elastic import ElasticMap
 from mpm_ref.rom.fields.pod import modes
 from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.quadrature.eulerian import Eulerian
@@ -30,6 +31,14 @@ GRAVITY = np.array([1.0, -9.8, 3.0])
 def degree(request):
     """Of the splines."""
     return request.param
+
+
+def with_affine(body, C, transfer):
+    """The body with the affine velocity field of a transfer."""
+    q = body.particles
+    new = particles_at(q.x, q.v, q.m, q.V0, transfer)
+    new.C[:] = C
+    return body._replace(particles=new._replace(F=q.F))
 
 
 # steps on an exact manifold
@@ -52,16 +61,16 @@ def weights(n, d):
     return RHO * V0, V0
 
 
-def full(X, x, v, F=None):
+def full(X, x, v, F=None, law=LAW):
     """Body of the full model in a state."""
     q = particles_at(x, v, *weights(*X.shape), "pic")
-    return Body("full", q if F is None else q._replace(F=F.copy()), LAW, NoFlow(),
+    return Body("full", q if F is None else q._replace(F=F.copy()), law, NoFlow(),
                 np.arange(len(X)))
 
 
-def full_steps(body, conditions, gravity, degree, steps=STEPS):
+def full_steps(body, conditions, gravity, degree, steps=STEPS, transfer="pic"):
     """The body's particles after explicit steps."""
-    stepper = Stepper(Scheme(degree, "pic"), DX, len(gravity), gravity, conditions)
+    stepper = Stepper(Scheme(degree, transfer), DX, len(gravity), gravity, conditions)
     stepper.start([body])
     for k in range(steps):
         stepper.step([body], k * DT, DT)
@@ -124,6 +133,37 @@ def test_a_thrown_body_falls_as_in_the_full_model(d, degree, name, projection):
     assert largest_difference(map, latent, X, particles) < 1e-12
 
 
+@pytest.mark.parametrize("transfer", ["apic", "mls"])
+@pytest.mark.parametrize("name", ["lagrangian", "eulerian"])
+def test_a_body_without_stress_keeps_its_affine_velocity(d, degree, name, transfer):
+    """As in the full model, where PIC would average it over nodes. A shear, whose C stays."""
+    X, map, soft = cloud(d, 150), Affine(d), FixedCorotated(0.0, 0.0)
+    C = np.outer([1.5, 2.0, 1.0][:d], [4.0, -3.0, 0.0][:d])
+    rate = np.hstack([C, GRAVITY[:d, None]]).ravel()
+    v = map.velocity(X, map.rest, rate)
+    body = with_affine(full(X, X, v, law=soft), C, transfer)
+    particles = full_steps(body, None, GRAVITY[:d], degree, transfer=transfer)
+    model = ldm_stepper(map, quadrature(name, X, degree), soft, GRAVITY[:d], transfer=transfer)
+    latent = reduced_steps(model, start_state(map.rest, rate), 12)
+    assert largest_difference(map, latent, X, particles) < 1e-11
+    averaged = full_steps(full(X, X, v, law=soft), None, GRAVITY[:d], degree)
+    assert abs(averaged.v - particles.v).max() > 1e-2
+
+
+def test_gradient_of_the_velocity_is_the_rate_of_f(d):
+    """Of a learned map, against differences in space."""
+    (map, latent), X, h = swinging(d), cloud(d, 20), 1e-6
+    field = ElasticMap(map, LAW)
+    _, F, _ = map.derivatives(X, latent.xhat)
+    slopes = [(map.velocity(X + step, latent.xhat, latent.vhat)
+               - map.velocity(X - step, latent.xhat, latent.vhat)) / (2.0 * h)
+              for step in h * np.eye(d)]
+    expected = np.stack(slopes, axis=2) @ np.linalg.inv(F)
+    found = field.velocity_gradient(X, latent.xhat, latent.vhat)
+    np.testing.assert_allclose(found, expected, atol=1e-6 * abs(expected).max())
+    assert not field.velocity_gradient(X, latent.xhat, 0.0 * latent.vhat).any()
+
+
 # single steps from a stressed state
 
 def anything(d, n=18):
@@ -137,16 +177,20 @@ def anything(d, n=18):
     return map, start_state(xhat, rng.normal(size=n * d))
 
 
+@pytest.mark.parametrize("transfer", ["pic", "apic", "mls"])
 @pytest.mark.parametrize("projection", ["linear", "nonlinear"])
-def test_a_step_that_nothing_restrains_is_one_of_the_full_model(d, degree, projection):
+def test_a_step_that_nothing_restrains_is_one_of_the_full_model(d, degree, projection, transfer):
     map, latent = anything(d)
     X, gravity, every = map.X, GRAVITY[:d], np.arange(len(map.X))
     x, F, G = map.derivatives(X, latent.xhat)
     v = G @ latent.vhat
-    particles = full_steps(full(X, x, v, F), None, gravity, degree, steps=1)
-    relaxed = full_steps(full(X, x, v), None, gravity, degree, steps=1)
     model = ldm_stepper(map, quadrature("lagrangian", X, degree), LAW, gravity,
-                    projection=projection)
+                        projection=projection, transfer=transfer)
+    bodies = [full(X, x, v, F), full(X, x, v)]
+    if transfer != "pic":
+        C = model.field.velocity_gradient(X, latent.xhat, latent.vhat)
+        bodies = [with_affine(body, C, transfer) for body in bodies]
+    particles, relaxed = (full_steps(body, None, gravity, degree, 1, transfer) for body in bodies)
     after, report = model.step(latent, every, 0.0, DT)
     size = abs(particles.v).max()
     assert report.rank == map.r

@@ -1,8 +1,10 @@
 """Elastic fields: the stress follows from the deformation gradient of the map.
 
-    tau_p = tau(F_p),    F_p = dg/dX,    no affine field
+    tau_p = tau(F_p),    F_p = dg/dX
 
-`ElasticMap` makes a field of a deformation map and a law, as LDM has it (LDM-eq15). `ElasticModes`
+`ElasticMap` makes a field of a deformation map and a law, as LDM has it (LDM-eq15), and with rates
+an affine velocity field, the gradient of the map's velocity, where a transfer asks for one. LDM
+itself is printed with PIC, which has none. `ElasticModes`
 does so for the modes of NSF's fields, where F = I + sum_k a_k(xhat) dU_k/dX: it is the model that
 NSF is compared with (NSF-X12). Where plasticity has acted, or a body is torn between two points,
 that is not the stress of the full model. The gradients of modes are those of the planes that fit
@@ -22,6 +24,7 @@ from .pod_fields import PodFields
 
 NEIGHBOURS = 26         # of a point, in 3D those of a lattice; in 2D 8
 LEAST = 1e-10           # of a spread over the largest: across a plane there is no gradient
+SHIFT = 1e-5            # of latent coordinates, over 1 + their length, for the rate of F
 
 
 class ElasticMap(NamedTuple):
@@ -51,6 +54,18 @@ class ElasticMap(NamedTuple):
     def velocity(self, X, xhat, vhat):
         """Return dg/dxhat vhat of points X (n, d) [m/s]."""
         return self.g.velocity(X, xhat, vhat)
+
+    def velocity_gradient(self, X, xhat, vhat):
+        """Return dv/dx (n, d, d) [1/s] of the velocity v = dg/dxhat vhat, F' F^-1 with the rate of
+        F along vhat by central differences.
+        """
+        F = self.g.derivatives(X, xhat)[1]
+        if not np.any(vhat):
+            return np.zeros_like(F)
+        h = SHIFT * (1.0 + np.linalg.norm(xhat)) / np.linalg.norm(vhat)
+        rate = (self.g.derivatives(X, xhat + h * vhat)[1]
+                - self.g.derivatives(X, xhat - h * vhat)[1]) / (2.0 * h)
+        return rate @ np.linalg.inv(F)
 
     def stress(self, X, xhat, F=None):
         """Return the Kirchhoff stress (n, d, d) [Pa] of F (n, d, d), if given, or of the map's."""

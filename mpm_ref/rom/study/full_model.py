@@ -11,6 +11,8 @@ from ...scene import build
 from ...shapes import Difference, Intersection, Union, level_set
 from ..step import MaterialPoints
 
+DAMPING = ("rpic", "relaxation", "mass_eps")    # keys of a scheme that reduced runs do not have
+
 
 class FullModel(NamedTuple):
     """The full-order model of one run; n points of all bodies, in the order of their sampling."""
@@ -45,21 +47,21 @@ class FullModel(NamedTuple):
 
 def ldm_full_model(scene):
     """Return the `FullModel` of a scene that LDM reduces. Raises ValueError for features that its
-    reduced runs do not have: more bodies, plastic flow, an affine transfer, averaged volumes or
-    splines, sources or sinks, conditions at surfaces, a velocity at the start, forces of single
-    particles, a box.
+    reduced runs do not have: more bodies, plastic flow, FLIP, relaxation and damping of affine
+    velocities, added mass, averaged volumes or splines, sources or sinks, conditions at surfaces,
+    forces of single particles, a box.
     """
     problem = build(scene)
     body = problem.bodies[0]
     unsupported = {"more than one body": len(problem.bodies) > 1,
                    "plastic flow": not isinstance(body.flow, NoFlow),
-                   f"the transfer {problem.scheme.transfer}": problem.scheme.transfer != "pic",
+                   "the transfer flip": problem.scheme.transfer == "flip",
+                   **{f"scheme.{key}": getattr(problem.scheme, key) > 0.0 for key in DAMPING},
                    "averaged volumes (f_bar)": problem.scheme.f_bar,
                    "single precision": problem.scheme.precision != "double",
                    "averaged splines (gimp)": problem.scheme.gimp > 0.0,
                    "sources or sinks": problem.sources or problem.sinks,
                    'boundary = "surface"': isinstance(problem.conditions, SurfaceConditions),
-                   "a start that moves": np.any(body.particles.v),
                    "forces of single particles": body.particles.b.ndim > 1,
                    "a box that clips": problem.clip is not None}
     for feature in (name for name, present in unsupported.items() if present):
@@ -84,7 +86,7 @@ def nsf_full_model(scene):
         (problem.scheme.transfer != "apic", f"the transfer {problem.scheme.transfer}",
          'scheme.transfer = "apic", whose affine field is one of theirs'),
         *((getattr(problem.scheme, key) > 0.0, f"scheme.{key}", f"scheme.{key} = 0")
-          for key in ("rpic", "relaxation", "mass_eps")),
+          for key in DAMPING),
         (problem.scheme.f_bar, "averaged volumes", "scheme.f_bar = false"),
         (problem.scheme.precision != "double", "single precision", "double"),
         (isinstance(problem.conditions, SurfaceConditions), 'boundary = "surface"',

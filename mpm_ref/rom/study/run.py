@@ -108,7 +108,8 @@ def ldm_model(full, g, options):
         raise ValueError(f"quadrature = {options.quadrature!r}: expected one of {', '.join(make)}")
     return ldm_stepper(with_precision(g, options), make[options.quadrature](full, options),
                        problem.bodies[0].law, problem.gravity, options.projection,
-                       conditions=problem.conditions, velocity=options.velocity)
+                       conditions=problem.conditions, velocity=options.velocity,
+                       transfer=problem.scheme.transfer)
 
 
 def with_precision(g, options):
@@ -150,8 +151,12 @@ def resampled_quadrature(full, options):
 
 
 def ldm_start(full, g, rest):
-    """Return the `Latent` of the body at rest, searched from latent coordinates near it."""
-    return initial(g, full.X[::-(-len(full.X) // ENOUGH)], xhat=rest)
+    """Return the `Latent` of the start, searched from latent coordinates near the body at rest; of
+    a body that moves, with the rates that fit its velocities (LDM-eq19).
+    """
+    some = slice(None, None, -(-len(full.X) // ENOUGH))
+    v = full.v[some] if np.any(full.v) else None
+    return initial(g, full.X[some], v=v, xhat=rest)
 
 
 # NSF.
