@@ -3,6 +3,8 @@
 `overview` measures three consecutive steps of larger scenes once their contact or pull has begun.
 """
 
+from functools import partial
+
 from ..common import targets
 from ..common.registry import experiment
 from .overview import (
@@ -16,30 +18,33 @@ from .overview import (
     size_text,
     smallest,
 )
-from .table3_runs import run_steps
+from .table3_runs import AFFORDABLE, run_steps
 from .warm_states import PRINTED
 
-SIZE = "quick"
 CAPS = {"max_iterations": 15, "max_cg_iterations": 300}        # of Gast15
 
 
-def run_costs(name, folder, count):
-    """Return ([`MethodCost`], [`Overview`]) of `count` steps evenly over a scene's run, whose
-    states are in a folder.
+def run_costs(name, size, folder, count):
+    """Return ([`MethodCost`], [`Overview`]) of `count` steps evenly over a scene's run at a size,
+    whose states are in a folder.
     """
-    steps = (step for _, step in run_steps(name, SIZE, folder, count))
+    steps = (step for _, step in run_steps(name, size, folder, count))
     return costs_of_steps(name, steps, CAPS)
 
 
 @experiment("hot.fig15-runs", title="Speed-up overview over entire runs",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 2400})
+            profiles=("quick", "standard", "paper"),
+            budget={"quick": 15, "standard": 9000, "paper": 3600})
 def speedups_over_runs(run):
     """Record the total time of all methods on all scenes over HOT's, and its ranges."""
-    names, count = run.choose(quick=(("faceless",), 2), standard=(PRINTED, 10))
+    names, count = run.choose(quick=(("faceless",), 2), standard=(PRINTED, 10),
+                              paper=(AFFORDABLE, 10))
     compile_methods(METHODS)
     rows, table = [], {}
     for name in run.progress(names, "scenes"):
-        step_costs, overviews = run_costs(name, run.folder / "states" / SIZE, count)
+        step_costs, totals = run.cached(name, partial(run_costs, name, run.profile,
+                                                      run.folder / "states", count))
+        overviews = [Overview(*total) for total in totals]
         rows += step_costs
         table[name] = {o.method: o for o in overviews}
         for o in overviews:
@@ -60,7 +65,7 @@ def record_total(run, o):
 
 def record_ranges(run, table):
     """Record the smallest and largest total over each method of the ablation, without a verdict:
-    the scenes have an eighth and less of the printed particles.
+    scenes are missing, or smaller than printed.
     """
     printed, scale = targets.load(), size_text(table)
     for method in ABLATION:

@@ -64,8 +64,9 @@ class ImpulseStepper(ImplicitStepper):
         return dv
 
 
-def run_history(scene, file, patience):
-    """Return the `RunHistory` of a scene: read from the file if it is there, else run and written.
+def run_history(scene, file, patience, with_states=False):
+    """Return the `RunHistory` of a scene: read from the file if it is there, else run and written,
+    if asked with its `RunStates` beside it.
 
     A run ends at the first step past `patience` CPU seconds; an error that breaks it is noted.
     """
@@ -73,15 +74,15 @@ def run_history(scene, file, patience):
     stored = read(file)
     if stored is not None and {k: stored.facts.get(k) for k in key} == key:
         return stored
-    history = run(scene, patience, file)
+    history = run(scene, patience, file if with_states else None)
     history = history._replace(facts={**key, **history.facts, "commit": commit(ROOT)})
     write(file, history)
     return history
 
 
 def run(scene, patience, file=None):
-    """Run a scene from its start and return its `RunHistory`; write its `RunStates` beside the file
-    of the history, if it has one.
+    """Run a scene from its start and return its `RunHistory`; write its `RunStates` beside a file
+    of the history, if one is given.
     """
     problem = build(scene)
     stepper = ImpulseStepper(problem.scheme, problem.dx, problem.dim, problem.gravity,

@@ -1,6 +1,6 @@
 """States of a scene evenly over its entire run, on disk: steps from them are measured without the
-run. A whole run (`run_history`) writes them, and so does what measures its steps; whoever comes
-first. They are of one version of the package and one scene; others are not read.
+run. A whole run of the standard profile (`run_history`) writes them, and so does what measures its
+steps. They are of one version of the package and one scene; others are not read.
 """
 
 from pathlib import Path

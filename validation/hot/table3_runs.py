@@ -2,7 +2,7 @@
 
 `table3` measures five steps of each scene once its contact or pull has begun. Here each scene runs
 by HOT to its end, and the steps that are measured lie evenly over the run, as the paper's means do.
-With fewer particles than the paper's they are no reproduction.
+With fewer particles than the paper's they are no reproduction. One scene has the printed size.
 """
 
 from functools import partial
@@ -19,6 +19,7 @@ from .run_states import RunStates, even_times
 from .table3 import METHODS, RowCost, cost
 from .warm_states import PRINTED, next_step_length, scene, take_step
 
+AFFORDABLE = ("faceless",)      # scenes whose entire run at the printed size takes minutes
 COLUMNS = ("scene", "t", "dt", "particles", "preconditioner", "newton", "cg", "converged")
 
 
@@ -71,10 +72,13 @@ def measure(name, size, folder, count):
 
 
 @experiment("hot.table3-runs", title="Newton's CG iterations over entire runs",
-            profiles=("quick", "standard"), budget={"quick": 12, "standard": 900})
+            profiles=("quick", "standard", "paper"),
+            budget={"quick": 12, "standard": 4000, "paper": 1200})
 def table3_runs(run):
     """Record mean CG iterations of a step by both preconditioners, and those of each step."""
-    names, count = run.choose(quick=(("faceless",), 2), standard=(PRINTED, 10))
+    names, count = run.choose(quick=(("faceless",), 2), standard=(PRINTED, 10),
+                              paper=(AFFORDABLE, 10))
+    smaller = () if run.profile == "paper" else ("small",)
     table = []
     for name in run.progress(names, "scenes"):
         costs, rows = run.cached(name, partial(measure, name, run.profile, run.folder / "states",
@@ -82,7 +86,7 @@ def table3_runs(run):
         table += rows
         for short, mean in ((short, RowCost(*values)) for short, values in costs.items()):
             few, most = np.quantile([row[6] for row in rows if row[4] == short], (0.0, 1.0))
-            run.record(f"hot.table3.{name}.{short}.cg_iters.small", mean.cg,
+            run.record(".".join((f"hot.table3.{name}.{short}.cg_iters", *smaller)), mean.cg,
                        scale=f"up to {mean.particles} particles, {mean.steps} steps evenly over "
                        "the run",
                        note=f"{few:.0f} to {most:.0f} by step; {mean.newton:.1f} Newton steps"

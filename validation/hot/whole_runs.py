@@ -21,6 +21,7 @@ from ..ldm.published_bodies import keep
 from .real_bodies import BODIES, absent, bodies_text, real_scene
 from .run_history import COLUMNS, run_history, unpublished
 from .sizes import SIZES, sized
+from .table3_runs import AFFORDABLE
 
 METHOD = "hot"
 ROWS = 500          # of the table, at most
@@ -57,10 +58,15 @@ def printed_bodies(run, name, scene):
     return scene if absent(name) else real_scene(name, scene, unpublished(run.folder / "states"))
 
 
+def is_measured(run, name):
+    """Return whether steps of a whole run are measured later, from its states."""
+    return run.profile == "standard" or (run.profile == "paper" and name in AFFORDABLE)
+
+
 def record_run(run, name, scene, patience):
     """Record a run of a scene, for `patience` CPU seconds at most, or its stored history."""
     file = run.folder / "states" / f"{name}.npz"
-    history = run_history(scene, file, patience)
+    history = run_history(scene, file, patience, with_states=is_measured(run, name))
     run.table("steps", COLUMNS, history.steps[evenly(len(history.steps), ROWS)].tolist())
     record_end(run, name, history)
     record_cost(run, name, history)

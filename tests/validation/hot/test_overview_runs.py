@@ -33,7 +33,7 @@ def test_measured_steps_end_where_a_block_enters():
 def test_every_method_solves_steps_over_the_run(monkeypatch, tmp_path):
     monkeypatch.setattr(overview, "METHODS", ("hot", "pn-pcg"))
     monkeypatch.setattr(table3_runs, "scene", lambda name, size: poured(12))
-    rows, (hot, pcg) = overview_runs.run_costs("sauce", tmp_path, 3)
+    rows, (hot, pcg) = overview_runs.run_costs("sauce", "quick", tmp_path, 3)
     assert [(row.method, row.step) for row in rows] == [
         (method, k) for k in range(3) for method in ("hot", "pn-pcg")]
     assert np.all(np.diff([row.t for row in rows[::2]]) > 0.1)

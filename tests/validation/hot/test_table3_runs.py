@@ -1,12 +1,14 @@
 """Steps that are measured over an entire run lie evenly, and are steps of the run itself."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 from validation.common.scenes import catalogue_scene, with_
-from validation.hot import table3_runs
+from validation.hot import table3_runs, whole_runs
 from validation.hot.run_history import run_history
 from validation.hot.run_states import RunStates, even_times
 from validation.hot.table3_runs import steps_evenly
@@ -57,7 +59,7 @@ def test_steps_from_states_on_disk_are_those_of_the_run(tmp_path, missing, monke
 
 def test_whole_run_leaves_the_states_that_steps_are_measured_from(tmp_path, monkeypatch):
     problem = build(small(20))
-    run_history(small(20), tmp_path / "bust.npz", 1e3)
+    run_history(small(20), tmp_path / "bust.npz", 1e3, with_states=True)
     states = RunStates(tmp_path, "bust", even_times(problem))
     monkeypatch.setattr(table3_runs, "take_step", lambda *_: pytest.fail("it is on disk"))
     stored = [(state.step, step.dt) for state, step in steps_evenly(problem, states)]
@@ -71,3 +73,26 @@ def test_states_of_another_scene_are_not_read(tmp_path):
     measured(build(small(6)), tmp_path)
     other = build(small(7))
     assert RunStates(tmp_path, "bust", even_times(other, 3)).read(0, other) is None
+
+
+@pytest.mark.parametrize(("profile", "end"), [("quick", ".small"), ("standard", ".small"),
+                                              ("paper", "")])
+def test_numbers_of_the_printed_size_alone_are_the_printed_ones(profile, end, tmp_path):
+    found = []
+    values = [("faceless", short, 9, 1, 2.0, 30.0, 1.0, 0.1, True) for short in table3_runs.METHODS]
+    rows = [("faceless", 0.0, 0.1, 9, short, 2, 30, True) for short in table3_runs.METHODS]
+    run = SimpleNamespace(
+        profile=profile, folder=tmp_path, choose=lambda **by: by[profile],
+        progress=lambda names, _: ["faceless"], table=lambda *_: None,
+        cached=lambda name, make: (dict(zip(table3_runs.METHODS, values, strict=True)), rows),
+        record=lambda id, value, **rest: found.append((id, value)))
+    table3_runs.table3_runs(run)
+    assert found == [(f"hot.table3.faceless.{short}.cg_iters{end}", 30.0)
+                     for short in table3_runs.METHODS]
+
+
+@pytest.mark.parametrize(("profile", "name", "kept"), [
+    ("quick", "faceless", False), ("standard", "wheel", True), ("paper", "faceless", True),
+    ("paper", "wheel", False)])
+def test_states_are_kept_of_runs_whose_steps_are_measured(profile, name, kept):
+    assert whole_runs.is_measured(SimpleNamespace(profile=profile), name) is kept
