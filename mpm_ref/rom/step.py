@@ -93,7 +93,7 @@ class ReducedStepper:
 
     @property
     def has_gradient(self):
-        """Whether the affine velocity field is the gradient of the map's velocity, with rates."""
+        """Return whether the affine velocity field is the gradient of the velocity, with rates."""
         return self.transfer != "pic" and isinstance(self.projection, RateProjection)
 
     def step(self, latent, samples, t, dt, weights=None):

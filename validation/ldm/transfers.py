@@ -30,7 +30,7 @@ class Case(NamedTuple):
     """A study's full models by one transfer, and what the errors of reduced runs need."""
 
     study: LdmStudy
-    map: object             # `Modes` of the training runs
+    g: object               # `Modes` of the training runs
     x: np.ndarray           # (runs, k + 1, n, d) full-order positions of the test runs [m]
 
 
@@ -64,7 +64,7 @@ def reduced_errors(one, transfer):
     study = one.study
     full = [ldm_full_model(by_transfer(study.scene.args[0], transfer, *study.mu[k]))
             for k in study.test]
-    return run_errors(full, one.x, one.map, RunOptions(), np.zeros(R))
+    return run_errors(full, one.x, one.g, RunOptions(), np.zeros(R))
 
 
 @experiment("ldm.transfers", title="LDM: reduced runs by other transfers, and of moving starts",
@@ -86,7 +86,7 @@ def record_case(run, start, transfer):
     scale = (f"{len(X)} particles, {one.x.shape[1] - 1} steps, {TESTS} test runs, POD of "
              f"{RUNS - TESTS} runs, r = {R}")
     errors = {"own": reduced_errors(one, transfer),
-              "nearest": nearest_state_errors(X, one.x, one.map, np.zeros(R))}
+              "nearest": nearest_state_errors(X, one.x, one.g, np.zeros(R))}
     if transfer != "pic":
         errors["pic"] = reduced_errors(one, "pic")
         run.record(f"{id}.gain", errors["own"].origin / errors["pic"].origin, unit="1",
