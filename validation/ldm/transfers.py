@@ -68,13 +68,13 @@ def reduced_errors(one, transfer):
 
 
 @experiment("ldm.transfers", title="LDM: reduced runs by other transfers, and of moving starts",
-            profiles=("quick", "standard"), budget={"quick": 20, "standard": 60})
+            profiles=("quick", "standard"), budget={"quick": 6, "standard": 60})
 def transfers(run):
     """Record errors of POD by the full model's own transfer, and by PIC."""
     rows = []
-    starts = run.choose(quick=("gravity",), standard=(*STARTS,))
+    starts, chosen = run.choose(quick=(("gravity",), ("mls",)), standard=(STARTS, TRANSFERS))
     for start in run.progress(starts, "starts"):
-        for transfer in TRANSFERS:
+        for transfer in chosen:
             rows += record_case(run, start, transfer)
     run.table("errors", COLUMNS, rows)
 
