@@ -58,17 +58,18 @@ class RateProjection:
                              + ", ".join(PROJECTIONS))
 
     def __call__(self, field, latent, samples, trial, dt, weights=None):
-        """Return `Projected` from the `Kinematics` of samples and their trial particles. Raises
-        ValueError for samples with weights.
+        """Return `Projected` from the `Kinematics` of samples and their trial particles; samples
+        count by weights (m,), or all the same.
         """
+        G, v, x = samples.G, trial.v, trial.x
         if weights is not None:
-            raise ValueError("samples with weights: expected samples that all count the same; "
-                             "weights are for the inversion of positions")
-        fit = project_velocity(samples.G, trial.v)
+            field = WeightedField(field, np.sqrt(weights)[:, None])
+            G, v, x = field.root[..., None] * G, field.root * v, field.root * x
+        fit = project_velocity(G, v)
         if self.kind == "linear":
             return Projected(latent.xhat + dt * fit.y, fit.y, fit._replace(iterations=0))
         guess = 2.0 * latent.xhat - latent.fitted_at
-        place = project_position(field, samples.points, trial.x, guess)
+        place = project_position(field, samples.points, x, guess)
         return Projected(place.y, fit.y, fit._replace(iterations=place.iterations,
                                                       converged=place.converged))
 

@@ -99,8 +99,8 @@ class ReducedStepper:
     def step(self, latent, samples, t, dt, weights=None):
         """Return the `Latent` and `Report` after a step from time t [s] by dt [s].
 
-        samples (m,) are numbers of material points, sorted; weights (m,) of them are for
-        `PositionInversion` alone. Raises one of BREAKDOWNS where the coordinates give no body.
+        samples (m,) are numbers of material points, sorted, which count in the projection by
+        weights (m,), or all the same. Raises one of BREAKDOWNS where the coordinates give no body.
         """
         if not np.isfinite(latent.xhat).all():
             raise NoBody(f"t = {t:.6g} s: latent coordinates {latent.xhat} are not finite")

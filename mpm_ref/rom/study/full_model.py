@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.levelset import distances
+from ...core.motion import STILL
 from ...core.surface import SurfaceConditions
 from ...materials import NoFlow
 from ...scene import build
@@ -24,7 +25,8 @@ class FullModel(NamedTuple):
     v: np.ndarray           # (n, d) velocity at the start [m/s]
     shape: object = None    # of LDM's body at rest, as the scene has it
     boundary_points: tuple = ()     # of LDM: index arrays of the points within a cell, at the
-                                    # start, of each prescribed region
+                                    # start, of each prescribed region ...
+    inner_points: tuple = ()        # ... and of those within it that moves; empty if it rests
 
     @property
     def rho(self):
@@ -40,9 +42,20 @@ class FullModel(NamedTuple):
         """Return those of `boundary_points` whose region acts in the step from time t [s] on;
         samples must not miss them (LDM-sec3.3-hyper).
         """
+        return self._acting(self.boundary_points, t)
+
+    def driven_points(self, t):
+        """Return the sorted numbers of the points in regions that move in the step from time t [s]
+        on.
+        """
+        return np.unique(np.concatenate([np.empty(0, dtype=int),
+                                         *self._acting(self.inner_points, t)]))
+
+    def _acting(self, points, t):
+        """Return those of groups, one of each prescribed region, whose region acts from t [s]."""
         middle = t + 0.5 * self.problem.clock.dt
-        regions = zip(self.boundary_points, prescribed_regions(self.problem), strict=True)
-        return tuple(points for points, region in regions if region.since < middle < region.until)
+        regions = zip(points, prescribed_regions(self.problem), strict=True)
+        return tuple(group for group, region in regions if region.since < middle < region.until)
 
 
 def ldm_full_model(scene):
@@ -67,9 +80,11 @@ def ldm_full_model(scene):
     for feature in (name for name, present in unsupported.items() if present):
         raise ValueError(f"the scene {problem.title!r} has {feature}: reduced runs know none")
     X, m, V0, v = points_of(problem.bodies)
-    boundary = tuple(np.flatnonzero(distances(X, region.shape) <= problem.dx)
-                     for region in prescribed_regions(problem))
-    return FullModel(problem, X, m, V0, v, scene.body[0].shape, boundary)
+    regions = prescribed_regions(problem)
+    boundary = tuple(np.flatnonzero(distances(X, one.shape) <= problem.dx) for one in regions)
+    inner = tuple(np.flatnonzero((distances(X, one.shape) <= 0.0) & (one.motion != STILL))
+                  for one in regions)
+    return FullModel(problem, X, m, V0, v, scene.body[0].shape, boundary, inner)
 
 
 def nsf_full_model(scene):

@@ -81,6 +81,8 @@ class RunOptions(NamedTuple):
     samples: str = "redrawn"
     preimage_tolerance: float = CLOSE       # distance of Eulerian points from their places [dx]
     precision: str = "double"   # of a learned map, or "single"
+    driven_weight: float = 1.0  # ours: of the samples in regions that move, over the others', in
+                                # the projection
 
     @property
     def name(self):

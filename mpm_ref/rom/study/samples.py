@@ -35,8 +35,12 @@ def ldm_sampler(full, g, options, xhat, seed):
     not exist, and as `random_draw` does.
     """
     rng = np.random.default_rng(seed)
+
+    def weighted(since, points, t):
+        return SampleSet(since, points, driven_weights(full, options, points, t))
+
     if options.samples == "redrawn":
-        return lambda t, latent: SampleSet(t, random_draw(full, g, options, t)(rng))
+        return lambda t, latent: weighted(t, random_draw(full, g, options, t)(rng), t)
     if options.samples == "kept":
         points = random_draw(full, g, options)(rng)
     elif options.samples == "pivoted":
@@ -44,7 +48,17 @@ def ldm_sampler(full, g, options, xhat, seed):
                                  lambda X: g.derivatives(X, xhat)[2], rng)
     else:
         raise ValueError(f"samples = {options.samples!r}: expected redrawn, kept or pivoted")
-    return lambda t, latent: SampleSet(0.0, points)
+    return lambda t, latent: weighted(0.0, points, t)
+
+
+def driven_weights(full, options, points, t):
+    """Return the weights (m,) of samples in the step that begins at t [s]: `driven_weight` of
+    those in regions that move, 1 of others; None where all count the same.
+    """
+    driven = np.isin(points, full.driven_points(t)) if options.driven_weight != 1.0 else None
+    if driven is None or not driven.any():
+        return None
+    return np.where(driven, options.driven_weight, 1.0)
 
 
 def random_draw(full, g, options, t=0.0):
