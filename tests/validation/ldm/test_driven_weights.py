@@ -1,0 +1,38 @@
+"""The weight of driven samples is chosen on training runs, and judged on test runs."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from mpm_ref.rom.study.errors import PositionErrors
+from validation.ldm import driven_weights as experiment
+from validation.ldm.studies import POKES
+
+ERRORS = {("training", 1.0): 5.0, ("training", 4.0): 3.0, ("training", 9.0): 2.0,
+          ("training", 25.0): 4.0, ("test", 1.0): 8.0, ("test", 9.0): 6.0}    # 4: best of test
+
+
+def test_the_best_weight_of_training_runs_is_tested(monkeypatch):
+    found, nothing = {}, SimpleNamespace(X=np.zeros((7, 3)), scale="runs")
+    monkeypatch.setattr(experiment, "maps", lambda: {"network": None})
+    monkeypatch.setattr(experiment, "training_references", lambda count: nothing)
+    monkeypatch.setattr(experiment, "references", lambda study, count: nothing)
+    monkeypatch.setattr(experiment, "errors_of", lambda run, about, runs, options: PositionErrors(
+        *3 * [ERRORS[about[1], options.driven_weight]]))
+    tables = {}
+    run = SimpleNamespace(progress=lambda names, noun: names,
+                          record=lambda name, value, **rest: found.update({name: value}),
+                          table=lambda name, columns, rows: tables.update({name: rows}))
+    experiment.driven_weights(run)
+    assert found["ldm.driven-weight.network.all.gain"] == 0.75
+    assert found["ldm.driven-weight.network.50"] == 600.0
+    assert [row[1:4] for row in tables["errors"]] == [
+        *((w, 7, "training") for w in (1.0, 4.0, 9.0, 25.0)),
+        *((w, n, "test") for n in (50, 7) for w in (1.0, 9.0))]
+
+
+def test_training_runs_are_those_of_the_study():
+    found = experiment.training_references(2)
+    runs = POKES.train[0], POKES.train[len(POKES.train) // 2]
+    assert [one.problem.title for one in found.cases] == 2 * ["LDM: poke and recover"]
+    np.testing.assert_array_equal(found.x, POKES.run(runs).x)
