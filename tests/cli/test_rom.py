@@ -69,6 +69,7 @@ def test_an_unstable_run_has_status_3_and_says_which(tmp_path):
 @pytest.mark.parametrize(("before", "after", "words"), [
     ('transfer = "pic"', 'transfer = "flip"', "has the transfer flip"),
     ('transfer = "pic"', 'transfer = "apic", rpic = 0.5', "has scheme.rpic"),
+    ("dim = 2", 'dim = 2\nintegrator = "hot"', "has the implicit integrator"),
     ('law = "fixed_corotated", E = 1e4, nu = 0.3',
      'law = "hencky", E = 1e4, nu = 0.3, flow = { type = "von_mises", tau_y = 1.0 }',
      "has plastic flow"),

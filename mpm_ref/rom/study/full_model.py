@@ -60,14 +60,15 @@ class FullModel(NamedTuple):
 
 def ldm_full_model(scene):
     """Return the `FullModel` of a scene that LDM reduces. Raises ValueError for features that its
-    reduced runs do not have: more bodies, plastic flow, FLIP, relaxation and damping of affine
-    velocities, added mass, averaged volumes or splines, sources or sinks, conditions at surfaces,
-    forces of single particles, a box.
+    reduced runs do not have: more bodies, plastic flow, implicit steps, FLIP, relaxation and
+    damping of affine velocities, added mass, averaged volumes or splines, sources or sinks,
+    conditions at surfaces, forces of single particles, a box.
     """
     problem = build(scene)
     body = problem.bodies[0]
     unsupported = {"more than one body": len(problem.bodies) > 1,
                    "plastic flow": not isinstance(body.flow, NoFlow),
+                   f"the {problem.integrator} integrator": problem.integrator != "explicit",
                    "the transfer flip": problem.scheme.transfer == "flip",
                    **{f"scheme.{key}": getattr(problem.scheme, key) > 0.0 for key in DAMPING},
                    "averaged volumes (f_bar)": problem.scheme.f_bar,
