@@ -9,16 +9,15 @@ from ..common import targets
 from ..common.registry import experiment
 from .overview import (
     ABLATION,
-    METHODS,
     MethodCost,
     Overview,
-    compile_methods,
     costs_of_steps,
     fastest,
     size_text,
     smallest,
 )
-from .table3_runs import AFFORDABLE, run_steps
+from .sizes import AFFORDABLE
+from .table3_runs import note_bodies, run_steps
 from .warm_states import PRINTED
 
 CAPS = {"max_iterations": 15, "max_cg_iterations": 300}        # of Gast15
@@ -38,10 +37,10 @@ def run_costs(name, size, folder, count):
 def speedups_over_runs(run):
     """Record the total time of all methods on all scenes over HOT's, and its ranges."""
     names, count = run.choose(quick=(("faceless",), 2), standard=(PRINTED, 10),
-                              paper=(AFFORDABLE, 10))
-    compile_methods(METHODS)
+                              paper=(AFFORDABLE[:1], 10))
     rows, table = [], {}
     for name in run.progress(names, "scenes"):
+        note_bodies(run, name)
         step_costs, totals = run.cached(name, partial(run_costs, name, run.profile,
                                                       run.folder / "states", count))
         overviews = [Overview(*total) for total in totals]

@@ -8,6 +8,7 @@ from mpm_ref.streams import blocks_until
 
 from ..common.scenes import catalogue_scene, with_
 
+AFFORDABLE = ("faceless", "wheel")      # scenes whose entire run at the printed size takes minutes
 FILL = 0.87         # of the release's particles per cell, by the numbers of Table 2 where shapes
                     # are known (Chain 308 000, Boards 188 000), as for LDM-tab2-sampling
 

@@ -17,10 +17,10 @@ from .one_step import implicit_step, solve_step
 from .real_bodies import bodies_text, with_real_bodies
 from .run_history import unpublished
 from .run_states import RunStates, even_times
+from .sizes import AFFORDABLE
 from .table3 import METHODS, RowCost, cost
 from .warm_states import PRINTED, catalogue_name, next_step_length, scene, take_step
 
-AFFORDABLE = ("faceless", "wheel")      # whose entire run at the printed size is affordable
 COLUMNS = ("scene", "t", "dt", "particles", "preconditioner", "newton", "cg", "converged")
 
 
@@ -63,6 +63,12 @@ def run_steps(name, size, folder, count):
     return steps_evenly(problem, states)
 
 
+def note_bodies(run, name):
+    """Note which bodies a scene has at the printed size."""
+    if run.profile == "paper":
+        run.note(f"{name}: {bodies_text(catalogue_name(name))}")
+
+
 def measure(name, size, folder, count):
     """Return ({preconditioner: values of a `RowCost`}, rows of COLUMNS) of `run_steps`."""
     advanced, rows, by_method = 0.0, [], {short: [] for short in METHODS}
@@ -87,8 +93,7 @@ def table3_runs(run):
     smaller = () if run.profile == "paper" else ("small",)
     table = []
     for name in run.progress(names, "scenes"):
-        if run.profile == "paper":
-            run.note(f"{name}: {bodies_text(catalogue_name(name))}")
+        note_bodies(run, name)
         costs, rows = run.cached(name, partial(measure, name, run.profile, run.folder / "states",
                                                count))
         table += rows

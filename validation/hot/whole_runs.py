@@ -20,8 +20,7 @@ from ..common.scenes import evenly
 from ..ldm.published_bodies import keep
 from .real_bodies import BODIES, bodies_text, with_real_bodies
 from .run_history import COLUMNS, run_history, unpublished
-from .sizes import SIZES, sized
-from .table3_runs import AFFORDABLE
+from .sizes import AFFORDABLE, SIZES, sized
 
 METHOD = "hot"
 ROWS = 500          # of the table, at most
