@@ -66,6 +66,8 @@ class RateProjection:
             field = WeightedField(field, np.sqrt(weights)[:, None])
             G, v, x = field.root[..., None] * G, field.root * v, field.root * x
         fit = project_velocity(G, v)
+        if weights is not None:
+            fit = fit._replace(residual=rms((samples.G @ fit.y - trial.v).ravel(), len(G)))
         if self.kind == "linear":
             return Projected(latent.xhat + dt * fit.y, fit.y, fit._replace(iterations=0))
         guess = 2.0 * latent.xhat - latent.fitted_at

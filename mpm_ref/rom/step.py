@@ -85,6 +85,9 @@ class ReducedStepper:
         if self.velocity not in VELOCITIES:
             raise ValueError(f"velocity = {self.velocity!r}: expected one of "
                              + ", ".join(VELOCITIES))
+        known = ("pic", "apic", "mls") if self.has_rates else ("pic", "apic")
+        if self.transfer not in known:
+            raise ValueError(f"transfer = {self.transfer!r}: expected one of {', '.join(known)}")
         if self.has_gradient and self.velocity != "previous":
             raise ValueError(f"velocity = {self.velocity!r} with transfer {self.transfer!r}: "
                              "expected 'previous', whose gradient is known")
@@ -92,9 +95,14 @@ class ReducedStepper:
         self.storage = Storage(self.quadrature.dx, self.scheme.stencil, d)
 
     @property
+    def has_rates(self):
+        """Return whether rates of the latent coordinates are fitted, as LDM does."""
+        return isinstance(self.projection, RateProjection)
+
+    @property
     def has_gradient(self):
-        """Return whether the affine velocity field is the gradient of the velocity, with rates."""
-        return self.transfer != "pic" and isinstance(self.projection, RateProjection)
+        """Return whether the affine velocity field is the gradient of the map's velocity."""
+        return self.transfer != "pic" and self.has_rates
 
     def step(self, latent, samples, t, dt, weights=None):
         """Return the `Latent` and `Report` after a step from time t [s] by dt [s].
@@ -147,10 +155,9 @@ class ReducedStepper:
         """
         particles = particles_at(state.x, velocity(state), *sizes, transfer=self.transfer)
         particles.tau[:] = self.field.stress(state.points, latent.xhat, state.F)
-        if self.has_gradient:
-            particles.C[:] = self.field.velocity_gradient(state.points, latent.fitted_at,
-                                                          latent.vhat)
-        elif self.transfer == "apic":
+        if self.has_gradient and latent.before is not None:     # scenes start without
+            particles.C[:] = self.field.velocity_gradient(state.points, latent.before, latent.vhat)
+        elif self.transfer == "apic" and not self.has_rates:
             particles.C[:] = self.field.affine(state.points, latent.xhat)
         return Body("reduced", particles, None, NoFlow(), np.arange(len(state.x)))
 

@@ -9,8 +9,8 @@ from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.projection import RateProjection
 from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.run import RunOptions
-from mpm_ref.rom.study.samples import driven_weights
-from validation.common.scenes import catalogue_scene
+from mpm_ref.rom.study.samples import driven_weights, ldm_sampler
+from validation.common.scenes import catalogue_scene, with_
 
 
 class Trial:
@@ -60,3 +60,33 @@ def test_a_weight_counts_like_repeated_samples(d, kind):
     np.testing.assert_allclose(weighted.xhat, repeated.xhat, atol=1e-12)
     np.testing.assert_allclose(weighted.vhat, repeated.vhat, atol=1e-12)
     assert abs(weighted.vhat - plain.vhat).max() > 1e-3
+    G, v_chosen = evaluate(map, X, latent.xhat).G, v
+    distance = np.sqrt(np.mean(np.sum((G @ weighted.vhat - v_chosen) ** 2, axis=1)))
+    if kind == "linear":
+        assert weighted.fit.residual == pytest.approx(distance)
+
+
+@pytest.mark.parametrize("samples", ["redrawn", "kept", "pivoted"])
+def test_samples_of_a_run_have_weights_while_they_are_driven(poke, samples):
+    options = RunOptions(points=200, samples=samples, driven_weight=9.0)
+    map = Affine(3)
+    sampler = ldm_sampler(poke, map, options, map.rest, 0)
+    for t, weighted in ((0.0, True), (0.2, True), (0.3, False)):
+        found = sampler(t, start_state(map.rest))
+        assert (found.weights is not None) is weighted
+        if weighted:
+            np.testing.assert_array_equal(found.weights == 9.0,
+                                          np.isin(found.points, poke.driven_points(t)))
+
+
+def test_weight_without_driven_points_is_refused():
+    still, map = ldm_full_model(catalogue_scene("ldm_gravity")), Affine(3)
+    with pytest.raises(ValueError, match="driven_weight = 9: expected 1, since no point is inside"):
+        ldm_sampler(still, map, RunOptions(driven_weight=9.0), map.rest, 0)
+
+
+def test_a_region_that_is_placed_but_fixed_drives_nothing():
+    scene = catalogue_scene("ldm_poke")
+    base, poke = scene.fixed
+    placed = with_(poke, motion=with_(poke.motion, translation=None, center=(0.0, 0.0, 0.0)))
+    assert not len(ldm_full_model(with_(scene, fixed=(base, placed))).driven_points(0.0))

@@ -6,9 +6,11 @@ from rom_toys import cloud
 
 from mpm_ref.core.grid import OutOfRange
 from mpm_ref.rom.fields.affine import Affine
+from mpm_ref.rom.fields.elastic import ElasticMap
 from mpm_ref.rom.kinematics import NoBody
 from mpm_ref.rom.latent import start_state
-from mpm_ref.rom.step import ldm_stepper
+from mpm_ref.rom.projection import PositionInversion
+from mpm_ref.rom.step import ReducedStepper, ldm_stepper
 from tests.rom.test_step import DT, GRAVITY, LAW, learned, quadrature, swinging
 
 
@@ -41,3 +43,21 @@ def test_latent_coordinates_that_ran_away_are_said_to_be(d, far, fault):
     model = ldm_stepper(map, quadrature("lagrangian", X, 2), LAW, GRAVITY[:d])
     with pytest.raises(fault):
         model.step(start_state(map.rest + far * np.arange(map.r)), np.arange(9), 0.0, DT)
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    ({"transfer": "mls", "velocity": "latest"}, "velocity = 'latest' with transfer 'mls'"),
+    ({"transfer": "flip"}, "transfer = 'flip': expected one of pic, apic, mls"),
+])
+def test_transfers_and_velocities_that_do_not_fit_are_refused(options, words):
+    X = cloud(2, 20)
+    with pytest.raises(ValueError, match=words):
+        ldm_stepper(Affine(2), quadrature("lagrangian", X, 2), LAW, GRAVITY[:2], **options)
+
+
+def test_inverted_positions_have_no_mls_transfer():
+    X = cloud(2, 20)
+    body = quadrature("lagrangian", X, 2)
+    with pytest.raises(ValueError, match="transfer = 'mls': expected one of pic, apic"):
+        ReducedStepper(ElasticMap(Affine(2), LAW), body, PositionInversion(), GRAVITY[:2],
+                       transfer="mls")

@@ -15,9 +15,9 @@ from ..common.registry import experiment
 from .networks import trained
 from .references import References, pod, record_errors, references
 from .studies import POKES
-from .tables import POINTS, TESTED, R
+from .tables import DRAWS, POINTS, TESTED, R
 
-WEIGHTS = (1.0, 4.0, 9.0, 25.0)
+WEIGHTS = (1.0, 4.0, 9.0, 25.0, 64.0)
 CHOSEN_ON = 3           # training runs
 COLUMNS = ("map", "weight", "points", "runs", "origin", "centroid", "displacement")
 
@@ -45,7 +45,8 @@ def driven_weights(run):
                  for w in WEIGHTS}
         for w, errors in found.items():
             record_errors(run, f"ldm.driven-weight.{name}.training.{w:g}", errors,
-                          training.scale, comparator="info")
+                          f"{len(training.X)} particles, {CHOSEN_ON} of {training.total} training "
+                          "runs", comparator="info")
             rows.append((name, w, len(training.X), "training", *errors))
         best = min(found, key=lambda w: found[w].origin)
         rows += tested_rows(run, name, tests, best)
@@ -55,26 +56,31 @@ def driven_weights(run):
 def tested_rows(run, name, tests, weight):
     """Record the errors of test runs with a weight, and over those without; return rows of both."""
     rows = []
+    judged = ({"comparator": "info"} if weight == 1.0
+              else {"comparator": "<=", "bound": 1.0})
     for points in (POINTS, None):
         without, weighted = (errors_of(run, (name, "test"), tests,
                                        RunOptions(points=points, driven_weight=w))
                              for w in (1.0, weight))
-        word = points or "all"
+        word, draws = points or "all", f"; {DRAWS[POKES.name]} draws" if points else ""
         record_errors(run, f"ldm.driven-weight.{name}.{word}", weighted, tests.scale,
-                      f"weight {weight:g}, chosen on training runs", comparator="info")
+                      f"weight {weight:g}, chosen on training runs{draws}", comparator="info")
         run.record(f"ldm.driven-weight.{name}.{word}.gain", weighted.origin / without.origin,
-                   unit="1", comparator="<=", bound=1.0, scale=tests.scale,
+                   unit="1", **judged, scale=tests.scale,
                    note=f"error with weight {weight:g} over that without, "
-                   f"{100.0 * without.origin:.3g} %")
+                   f"{100.0 * without.origin:.3g} %{draws}")
         rows += [(name, w, points or len(tests.X), "test", *errors)
                  for w, errors in ((1.0, without), (weight, weighted))]
     return rows
 
 
 def errors_of(run, about, runs, options):
-    """Return the `PositionErrors` of `References` on a map; about: its name, and a word for the
-    runs.
+    """Return the `PositionErrors` of `References` on a map, a mean over draws of few samples;
+    about: its name, and a word for the runs.
     """
     g, rest = maps()[about[0]]
+    draws = range(DRAWS[POKES.name] if options.points else 1)
     key = f"{'.'.join(about)}.{options.points}.{options.driven_weight:g}"
-    return PositionErrors(*run.cached(key, lambda: [*runs.run_errors(g, rest, options)]))
+    return PositionErrors(*np.mean([
+        run.cached(f"{key}.{k}", lambda k=k: [*runs.run_errors(g, rest, options, 1000 * k)])
+        for k in draws], axis=0).tolist())

@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.levelset import distances
-from ...core.motion import STILL
 from ...core.surface import SurfaceConditions
 from ...materials import NoFlow
 from ...scene import build
@@ -26,7 +25,7 @@ class FullModel(NamedTuple):
     shape: object = None    # of LDM's body at rest, as the scene has it
     boundary_points: tuple = ()     # of LDM: index arrays of the points within a cell, at the
                                     # start, of each prescribed region ...
-    inner_points: tuple = ()        # ... and of those within it that moves; empty if it rests
+    inner_points: tuple = ()        # ... and of those inside it at the start; none if it is fixed
 
     @property
     def rho(self):
@@ -45,8 +44,8 @@ class FullModel(NamedTuple):
         return self._acting(self.boundary_points, t)
 
     def driven_points(self, t):
-        """Return the sorted numbers of the points in regions that move in the step from time t [s]
-        on.
+        """Return the sorted numbers of the points that were at the start inside a region with a
+        motion which acts in the step from time t [s] on.
         """
         return np.unique(np.concatenate([np.empty(0, dtype=int),
                                          *self._acting(self.inner_points, t)]))
@@ -83,7 +82,7 @@ def ldm_full_model(scene):
     X, m, V0, v = points_of(problem.bodies)
     regions = prescribed_regions(problem)
     boundary = tuple(np.flatnonzero(distances(X, one.shape) <= problem.dx) for one in regions)
-    inner = tuple(np.flatnonzero((distances(X, one.shape) <= 0.0) & (one.motion != STILL))
+    inner = tuple(np.flatnonzero((distances(X, one.shape) <= 0.0) & one.motion.moves)
                   for one in regions)
     return FullModel(problem, X, m, V0, v, scene.body[0].shape, boundary, inner)
 

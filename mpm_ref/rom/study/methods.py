@@ -129,8 +129,8 @@ def nsf_recording(study, full, fields, model, facts, count):
 
 
 LDM_METHOD = ReductionMethod(
-    stored=("x", "F", "v"), free_fields=("material",),
-    parameters='gravity, a material or a motion; with model = "nsf" a velocity at the start too',
+    stored=("x", "F", "v"), free_fields=("material", "velocity"),
+    parameters="gravity, a material, a motion or a velocity at the start",
     frame_spacing=every_step, full_model=ldm_full_model, require_samples=lambda study, full: None,
     load=load_snapshots, compute=compute_map, train=train_map, misfit=map_misfit,
     field_of_run=lambda g, full, mu: g, reduced_run=ldm_reduced_run, recording=ldm_recording,

@@ -81,8 +81,8 @@ class RunOptions(NamedTuple):
     samples: str = "redrawn"
     preimage_tolerance: float = CLOSE       # distance of Eulerian points from their places [dx]
     precision: str = "double"   # of a learned map, or "single"
-    driven_weight: float = 1.0  # ours: of the samples in regions that move, over the others', in
-                                # the projection
+    driven_weight: float = 1.0  # ours: of the samples that moving regions drive
+                                # (`FullModel.driven_points`), over the others', in the projection
 
     @property
     def name(self):
@@ -108,15 +108,17 @@ def ldm_model(full, g, options):
             "resampled": resampled_quadrature}
     if options.quadrature not in make:
         raise ValueError(f"quadrature = {options.quadrature!r}: expected one of {', '.join(make)}")
-    return ldm_stepper(with_precision(g, options), make[options.quadrature](full, options),
-                       problem.bodies[0].law, problem.gravity, options.projection,
-                       conditions=problem.conditions, velocity=options.velocity,
-                       transfer=problem.scheme.transfer)
+    transfer = problem.scheme.transfer
+    return ldm_stepper(with_precision(g, options, transfer),
+                       make[options.quadrature](full, options), problem.bodies[0].law,
+                       problem.gravity, options.projection, conditions=problem.conditions,
+                       velocity=options.velocity, transfer=transfer)
 
 
-def with_precision(g, options):
+def with_precision(g, options, transfer):
     """Return a map in the precision of `RunOptions`. Raises ValueError for one that does not exist,
-    a map that has only doubles, and preimages closer than single precision can tell.
+    a map that has only doubles, an affine transfer, whose rate of F is a difference, and preimages
+    closer than single precision can tell.
     """
     if options.precision == "double":
         return g
@@ -125,6 +127,8 @@ def with_precision(g, options):
     if not hasattr(g, "single"):
         raise ValueError("precision = 'single': learned maps alone have it, this is one of "
                          f"{type(g).__name__}")
+    if transfer != "pic":
+        raise ValueError(f"precision = 'single' with the transfer {transfer!r}: expected double")
     if options.quadrature == "eulerian" and options.preimage_tolerance < SINGLE:
         raise ValueError(f"preimage_tolerance = {options.preimage_tolerance:g} dx in single "
                          f"precision: expected at least {SINGLE:g}")

@@ -32,8 +32,11 @@ class SampleSet(NamedTuple):
 def ldm_sampler(full, g, options, xhat, seed):
     """Return the function (time [s], `Latent`) -> `SampleSet` of the step that begins there, for
     LDM's run of a `FullModel` on a map g with `RunOptions`. Raises ValueError for `samples` that do
-    not exist, and as `random_draw` does.
+    not exist, for a `driven_weight` where no point is driven, and as `random_draw` does.
     """
+    if options.driven_weight != 1.0 and not any(map(len, full.inner_points)):
+        raise ValueError(f"driven_weight = {options.driven_weight:g}: expected 1, since no point "
+                         "is inside a region that moves")
     rng = np.random.default_rng(seed)
 
     def weighted(since, points, t):
@@ -53,7 +56,7 @@ def ldm_sampler(full, g, options, xhat, seed):
 
 def driven_weights(full, options, points, t):
     """Return the weights (m,) of samples in the step that begins at t [s]: `driven_weight` of
-    those in regions that move, 1 of others; None where all count the same.
+    those that are driven, 1 of others; None where all count the same.
     """
     driven = np.isin(points, full.driven_points(t)) if options.driven_weight != 1.0 else None
     if driven is None or not driven.any():

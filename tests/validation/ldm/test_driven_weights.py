@@ -9,11 +9,11 @@ from validation.ldm import driven_weights as experiment
 from validation.ldm.studies import POKES
 
 ERRORS = {("training", 1.0): 5.0, ("training", 4.0): 3.0, ("training", 9.0): 2.0,
-          ("training", 25.0): 4.0, ("test", 1.0): 8.0, ("test", 9.0): 6.0}    # 4: best of test
+          ("training", 25.0): 4.0, ("training", 64.0): 4.5, ("test", 1.0): 8.0, ("test", 9.0): 6.0}
 
 
 def test_the_best_weight_of_training_runs_is_tested(monkeypatch):
-    found, nothing = {}, SimpleNamespace(X=np.zeros((7, 3)), scale="runs")
+    found, nothing = {}, SimpleNamespace(X=np.zeros((7, 3)), scale="runs", total=9)
     monkeypatch.setattr(experiment, "maps", lambda: {"network": None})
     monkeypatch.setattr(experiment, "training_references", lambda count: nothing)
     monkeypatch.setattr(experiment, "references", lambda study, count: nothing)
@@ -27,7 +27,7 @@ def test_the_best_weight_of_training_runs_is_tested(monkeypatch):
     assert found["ldm.driven-weight.network.all.gain"] == 0.75
     assert found["ldm.driven-weight.network.50"] == 600.0
     assert [row[1:4] for row in tables["errors"]] == [
-        *((w, 7, "training") for w in (1.0, 4.0, 9.0, 25.0)),
+        *((w, 7, "training") for w in (1.0, 4.0, 9.0, 25.0, 64.0)),
         *((w, n, "test") for n in (50, 7) for w in (1.0, 9.0))]
 
 
