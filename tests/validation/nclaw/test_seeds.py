@@ -34,3 +34,5 @@ def test_median_of_seeds_stands_beside_the_printed_error(profile, rule):
     record_task(run, ("water", "velocity"), "admissible", [1e-6, 8e-6, 2e-6])
     id = "nclaw.seeds.admissible.water.velocity"
     assert found == {id: (2e-6, *rule), f"{id}.spread": (pytest.approx(8.0), "info", None)}
+    record_task(run, ("water", "velocity"), "admissible", [1e-6, 8e-6])
+    assert found[id] == (4.5e-6, "info", None)      # a seed is missing
