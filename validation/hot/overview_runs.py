@@ -1,6 +1,6 @@
 """Figure 15 over entire runs: the time of every method for steps evenly over each scene's run.
 
-`overview` measures three consecutive steps of larger scenes once their contact or pull has begun.
+`overview` measures three consecutive steps of each scene once its contact or pull has begun.
 """
 
 from functools import partial

@@ -119,7 +119,8 @@ def record_parts(run, name, one, map_at_rest, options):
     spent, evaluated, points = split_step(one, map_at_rest, options)
     field, rest = map_at_rest
     total = sum(spent.values())
-    each = evaluation_costs(one, with_precision(field, options), rest)
+    precise = with_precision(field, options, one.problem.scheme.transfer)
+    each = evaluation_costs(one, precise, rest)
     predicted = sum(evaluated[kind] * each[kind] for kind in EVALUATIONS)
     shares = ", ".join(f"{part} {spent[part] / total:.0%}" for part in PARTS)
     scale = f"{len(one.X)} particles, {options.points} samples, {points:.0f} quadrature points"

@@ -149,7 +149,7 @@ class MapRunTable(StudyTable):
     preimage_tolerance: Positive = RunOptions().preimage_tolerance  # distance of Eulerian points
                                                 # from their places [dx]
     precision: str = RunOptions().precision            # of a network
-    driven_weight: Positive = RunOptions().driven_weight    # of samples in regions that move
+    driven_weight: Positive = RunOptions().driven_weight    # of samples that are driven
     velocity: str = RunOptions().velocity
     seed: Seed = 0                              # of the samples
 

@@ -1,6 +1,7 @@
 """What choices of reduced runs cost: the clock, the counts, and the settings compared."""
 
 from time import process_time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from validation.trade.ldm_cost import (
     PartTimer,
     TimedCalls,
     evaluation_costs,
+    record_parts,
     runs_to_pay,
     split_step,
 )
@@ -95,6 +97,15 @@ def test_near_preimages_ask_less(one):
                                way._replace(preimage_tolerance=close), 2) for close in (1e-9, 1e-2))
     assert cheap[2] == paper[2]
     assert cheap[1]["derivatives"] < 0.7 * paper[1]["derivatives"]
+
+
+def test_parts_of_a_step_are_recorded_in_the_precision_of_its_options(one):
+    found, model = {}, trained("gravity-r4")
+    run = SimpleNamespace(record=lambda name, value, **rest: found.update({name: value}))
+    options = RunOptions("eulerian", points=20, preimage_tolerance=1e-2, precision="single")
+    row = record_parts(run, "split.34.cheap", one, (model.field, model.rest), options)
+    assert found["split.34.cheap.us_per_point"] == pytest.approx(1e6 * row[3] / row[2])
+    assert row[:2] == (len(one.X), "cheap")
 
 
 def test_each_evaluation_has_a_cost(one):
