@@ -131,7 +131,7 @@ def test_a_region_that_was_let_go_asks_for_no_samples():
 
 
 @pytest.mark.parametrize(("scene", "said"), [
-    (with_(GRAVITY.scene(1.0), scheme=with_(GRAVITY.scene(1.0).scheme, transfer="apic")), "apic"),
+    (with_(GRAVITY.scene(1.0), scheme=with_(GRAVITY.scene(1.0).scheme, transfer="flip")), "flip"),
     (with_(GRAVITY.scene(1.0), scheme=with_(GRAVITY.scene(1.0).scheme, f_bar=True)), "averaged"),
     (with_(GRAVITY.scene(1.0), scheme=Scheme(transfer="pic", gimp=2.0)), r"\(gimp\)"),
     (with_(GRAVITY.scene(1.0), scheme=Scheme(transfer="pic", precision="single")), "single"),
