@@ -8,7 +8,7 @@ from mpm_ref.rom.kinematics import evaluate
 from mpm_ref.rom.latent import start_state
 from mpm_ref.rom.projection import RateProjection
 from mpm_ref.rom.study.full_model import ldm_full_model
-from mpm_ref.rom.study.run import RunOptions
+from mpm_ref.rom.study.run import RunOptions, ldm_model
 from mpm_ref.rom.study.samples import driven_weights, ldm_sampler
 from validation.common.scenes import catalogue_scene, with_
 
@@ -81,7 +81,7 @@ def test_samples_of_a_run_have_weights_while_they_are_driven(poke, samples):
 def test_weight_without_driven_points_is_refused():
     still, map = ldm_full_model(catalogue_scene("ldm_gravity")), Affine(3)
     with pytest.raises(ValueError, match="driven_weight = 9: expected 1, since no point is inside"):
-        ldm_sampler(still, map, RunOptions(driven_weight=9.0), map.rest, 0)
+        ldm_model(still, map, RunOptions(driven_weight=9.0))
 
 
 def test_a_region_that_is_placed_but_fixed_drives_nothing():

@@ -70,7 +70,7 @@ def tested_rows(run, name, tests, weight):
                    note=f"error with weight {weight:g} over that without, "
                    f"{100.0 * without.origin:.3g} %{draws}")
         rows += [(name, w, points or len(tests.X), "test", *errors)
-                 for w, errors in ((1.0, without), (weight, weighted))]
+                 for w, errors in {1.0: without, weight: weighted}.items()]
     return rows
 
 

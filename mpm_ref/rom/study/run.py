@@ -15,7 +15,14 @@ from ..quadrature.eulerian import Eulerian
 from ..quadrature.lagrangian import Resampled, lagrangian
 from ..step import StepReport, ldm_stepper, nsf_stepper
 from .full_model import signed_distance
-from .samples import ENOUGH, SampleSet, ldm_sampler, nsf_sampler, require_valid_sets
+from .samples import (
+    ENOUGH,
+    SampleSet,
+    ldm_sampler,
+    nsf_sampler,
+    require_driven_points,
+    require_valid_sets,
+)
 
 PRECISIONS = ("double", "single")
 QUADRATURES = ("lagrangian", "eulerian")
@@ -101,8 +108,9 @@ def ldm_run(full, g, options, rest, seed=0):
 
 def ldm_model(full, g, options):
     """Return LDM's `ReducedStepper` of a `FullModel` on a map g. Raises ValueError for a quadrature
-    that does not exist.
+    that does not exist, and as `require_driven_points` and `with_precision` do.
     """
+    require_driven_points(full, options)
     problem = full.problem
     make = {"lagrangian": material_quadrature, "eulerian": cell_quadrature,
             "resampled": resampled_quadrature}

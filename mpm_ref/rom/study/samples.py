@@ -32,11 +32,8 @@ class SampleSet(NamedTuple):
 def ldm_sampler(full, g, options, xhat, seed):
     """Return the function (time [s], `Latent`) -> `SampleSet` of the step that begins there, for
     LDM's run of a `FullModel` on a map g with `RunOptions`. Raises ValueError for `samples` that do
-    not exist, for a `driven_weight` where no point is driven, and as `random_draw` does.
+    not exist, and as `random_draw` does.
     """
-    if options.driven_weight != 1.0 and not any(map(len, full.inner_points)):
-        raise ValueError(f"driven_weight = {options.driven_weight:g}: expected 1, since no point "
-                         "is inside a region that moves")
     rng = np.random.default_rng(seed)
 
     def weighted(since, points, t):
@@ -52,6 +49,13 @@ def ldm_sampler(full, g, options, xhat, seed):
     else:
         raise ValueError(f"samples = {options.samples!r}: expected redrawn, kept or pivoted")
     return lambda t, latent: weighted(0.0, points, t)
+
+
+def require_driven_points(full, options):
+    """Raise ValueError for a `driven_weight` of a `FullModel` none of whose points is driven."""
+    if options.driven_weight != 1.0 and not any(map(len, full.inner_points)):
+        raise ValueError(f"driven_weight = {options.driven_weight:g}: expected 1, since no point "
+                         "is inside a region that moves")
 
 
 def driven_weights(full, options, points, t):

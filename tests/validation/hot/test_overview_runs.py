@@ -39,3 +39,14 @@ def test_every_method_solves_steps_over_the_run(monkeypatch, tmp_path):
     assert np.all(np.diff([row.t for row in rows[::2]]) > 0.1)
     assert (hot.total, hot.steps, hot.particles) == (1.0, 3, 240)       # of the last of them
     assert pcg.total > 0.0
+
+
+def test_methods_are_warmed_up_before_the_first_step_is_measured(monkeypatch, tmp_path):
+    calls = []
+    monkeypatch.setattr(overview, "METHODS", ("hot", "pn-pcg"))
+    monkeypatch.setattr(table3_runs, "scene", lambda name, size: poured(12))
+    solve = overview.solve_step
+    monkeypatch.setattr(overview, "solve_step", lambda step, method, **options: (
+        calls.append((method, "max_cg_iterations" in options)), solve(step, method, **options))[1])
+    overview_runs.run_costs("sauce", "quick", tmp_path, 2)
+    assert calls == [("hot", True), ("pn-pcg", True), *2 * [("hot", False), ("pn-pcg", False)]]
