@@ -56,8 +56,9 @@ class ElasticMap(NamedTuple):
         return self.g.velocity(X, xhat, vhat)
 
     def velocity_gradient(self, X, xhat, vhat):
-        """Return dv/dx (n, d, d) [1/s] of the velocity v = dg/dxhat vhat, F' F^-1 with the rate of
-        F along vhat by central differences.
+        """Return dv/dx = F' F^-1 (n, d, d) [1/s] of points X (n, d) at rest, for the velocity
+        v = dg/dxhat vhat (LDM-eq16) at coordinates xhat (r,) with rates vhat (r,) [1/s]; F' is the
+        rate of F along vhat, by central differences. Ours, for APIC and MLS-MPM.
         """
         F = self.g.derivatives(X, xhat)[1]
         if not np.any(vhat):
