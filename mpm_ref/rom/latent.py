@@ -68,17 +68,19 @@ def initial(g, X, x=None, v=None, xhat=None):
 def velocities(field, latent, dt, samples, v0=None):
     """Return {name: function of `Kinematics` -> v (n, d) [m/s]} of VELOCITIES, in a step of length
     dt [s] with these points as samples. v0: velocities (n, d) [m/s] of numbered points at the
-    start, which "difference" takes there; without them, those of the rates.
+    start, which "previous" and "difference" take there; without them, those of the rates.
     """
     def latest(state):
         return state.G @ latent.vhat
 
     def previous(state):
+        if latent.before is None and v0 is not None:
+            return v0[state.points]
         return field.velocity(state.points, latent.fitted_at, latent.vhat)
 
     def difference(state):
         if latent.before is None:
-            return previous(state) if v0 is None else v0[state.points]
+            return previous(state)
         return (state.x - field.place(state.points, latent.before)) / dt
 
     @cache

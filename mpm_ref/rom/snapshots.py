@@ -1,9 +1,9 @@
 """Training data of reduced models: full-order runs, all points at all stored time levels.
 
-`Snapshots` of one body, with deformation gradient and velocity, are what a deformation map is made
-from (LDM). `Histories` of all points of a scene, with stress and affine field, are what the three
-fields of NSF are made from. `units` and `field_units` are the scales that networks standardise
-them by.
+`Snapshots`, with deformation gradient and velocity, are what a deformation map is made from (LDM).
+`Histories`, with stress and affine field, are what the three fields of NSF are made from. Both are
+of all points of a scene. `units` and `field_units` are the scales that networks standardise them
+by.
 """
 
 from typing import NamedTuple
@@ -18,7 +18,9 @@ PLAIN, FIELDS = ("v", "mu"), ("x", "tau", "C")      # what each run has of its o
 
 
 class Snapshots(NamedTuple):
-    """s runs of n points over k steps; time levels 0 .. k, points in the body's own order."""
+    """s runs of n points over k steps; time levels 0 .. k, points in the scene's own
+    order.
+    """
 
     X: np.ndarray       # (n, d)                at rest [m]
     m: np.ndarray       # (n,)                  mass [kg]

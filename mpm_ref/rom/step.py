@@ -62,9 +62,9 @@ class ReducedStepper:
     """Advances latent coordinates by steps; `step` keeps no state but the grid's storage.
 
     The spacing of the grid and the degree of its splines are the quadrature's. velocity is one of
-    `latent.VELOCITIES`; v0 the velocities that "difference" takes at the start. dt may differ from
-    that of the data (NSF-sec5.1). Raises ValueError for a velocity that does not exist and a
-    gravity of another dimension.
+    `latent.VELOCITIES`; v0 the velocities of numbered points that "previous" and "difference" take
+    at the start. dt may differ from that of the data (NSF-sec5.1). Raises ValueError for a velocity
+    that does not exist and a gravity of another dimension.
     """
 
     field: ReducedField
@@ -184,7 +184,8 @@ class ReducedStepper:
 
 def ldm_stepper(g, quadrature, law, gravity, projection="linear", **options):
     """Return the `ReducedStepper` of LDM (LDM-alg2) on a deformation map g of a body of an elastic
-    law; projection: see `projection.RateProjection`; options: conditions, transfer and velocity.
+    law, or of several bodies and their `elastic.BodyLaws`; projection: see
+    `projection.RateProjection`; options: conditions, transfer, velocity, and v0 of several bodies.
     """
     return ReducedStepper(ElasticMap(g, law), quadrature, RateProjection(projection), gravity,
                           **options)

@@ -3,9 +3,10 @@
 In motion, a block's points lie within L radius of its centre's image, where L bounds the stretch.
 So the points that can be near a sample follow from one evaluation of the map for each block,
 whatever the number of points. If there are many blocks, their centres are points in larger blocks
-again.
+again. Blocks of several bodies have points of one body each.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,8 @@ class Blocks(NamedTuple):
 
     order: np.ndarray       # (n,)
     start: np.ndarray       # (blocks + 1,)
-    center: np.ndarray      # (blocks, d) of the blocks' points, at rest [m]
+    center: np.ndarray      # (blocks, d) of the blocks' points, at rest [m]; of several bodies,
+                            # numbers (blocks,) of the points nearest to it
     radius: np.ndarray      # (blocks,) largest distance of a block's point from it [m]
     above: object           # `Blocks` of the centres, or None
 
@@ -45,6 +47,40 @@ def blocks(X, size):
     radius = np.maximum.reduceat(distance[order], start[:-1])
     above = blocks(center, LARGER * size) if len(center) > MANY else None
     return Blocks(order, start, center, radius, above)
+
+
+class BodyBlocks(NamedTuple):
+    """The `Blocks` of several bodies, whose points have numbers, one body after the other."""
+
+    blocks: tuple
+
+    def near(self, g, xhat, x, distance):
+        """Return numbers of all points that may be within a distance [m] (see `Blocks.near`)."""
+        return np.concatenate([one.near(g, xhat, x, distance) for one in self.blocks])
+
+
+def body_blocks(X, sizes, size):
+    """Return the `BodyBlocks` of cubes of a size [m] of points X (n, d) at rest, of bodies with
+    these numbers of points.
+    """
+    ends = np.cumsum([0, *sizes])
+    parts = [numbered_blocks(X[first:last], size, np.arange(first, last))
+             for first, last in pairwise(ends)]
+    return BodyBlocks(tuple(one._replace(order=first + one.order)
+                            for first, one in zip(ends, parts, strict=False)))
+
+
+def numbered_blocks(X, size, numbers):
+    """Return the `Blocks` of a body's points X (n, d) at rest, whose centres are those of the
+    `numbers` (n,) of its points that are nearest to them.
+    """
+    order, start, center, _ = group(X, size)
+    near = KDTree(X).query(center)[1]
+    away = np.linalg.norm(X[order] - np.repeat(X[near], np.diff(start), axis=0), axis=1)
+    radius = np.maximum.reduceat(away, start[:-1])
+    above = (numbered_blocks(X[near], LARGER * size, numbers[near]) if len(center) > MANY
+             else None)
+    return Blocks(order, start, numbers[near], radius, above)
 
 
 def group(X, size):

@@ -2,9 +2,10 @@
 
     tau_p = tau(F_p),    F_p = dg/dX
 
-`ElasticMap` makes a field of a deformation map and a law, as LDM has it (LDM-eq15), and with rates
-an affine velocity field, the gradient of the map's velocity, where a transfer asks for one. LDM
-itself is printed with PIC, which has none. `ElasticModes`
+`ElasticMap` makes a field of a deformation map and a law, as LDM has it (LDM-eq15), or of the
+`BodyLaws` of several bodies, whose points have numbers; and with rates an affine velocity field,
+the gradient of the map's velocity, where a transfer asks for one. LDM itself is printed with PIC,
+which has none. `ElasticModes`
 does so for the modes of NSF's fields, where F = I + sum_k a_k(xhat) dU_k/dX: it is the model that
 NSF is compared with (NSF-X12). Where plasticity has acted, or a body is torn between two points,
 that is not the stress of the full model. The gradients of modes are those of the planes that fit
@@ -27,11 +28,42 @@ LEAST = 1e-10           # of a spread over the largest: across a plane there is 
 SHIFT = 1e-5            # of latent coordinates, over 1 + their length, for the rate of F
 
 
-class ElasticMap(NamedTuple):
-    """A deformation map of a body of one law, with the stress of its F."""
+class Portion(NamedTuple):
+    """The points of one body, and their law."""
 
-    g: object           # `fields.DeformationMap`, of points at rest
-    law: tuple          # the elastic law's parameters (see materials)
+    first: int
+    last: int           # the number after its last
+    law: tuple
+
+
+class BodyLaws(NamedTuple):
+    """The elastic laws of several bodies, whose points have numbers, one body after the other."""
+
+    portions: tuple     # of `Portion`
+
+    def stress(self, points, F):
+        """Return the Kirchhoff stress (m, d, d) [Pa] of F (m, d, d) of points by number (m,), each
+        by the law of its body.
+        """
+        tau = np.empty_like(F)
+        for one in self.portions:
+            inside = (points >= one.first) & (points < one.last)
+            tau[inside] = elastic_stress(F[inside], one.law)
+        return tau
+
+
+def body_laws(bodies):
+    """Return the `BodyLaws` of a problem's bodies."""
+    ends = np.cumsum([0] + [len(body.id) for body in bodies])
+    return BodyLaws(tuple(Portion(*pair, body.law)
+                          for pair, body in zip(pairwise(ends), bodies, strict=True)))
+
+
+class ElasticMap(NamedTuple):
+    """A deformation map of a body of one law, or of several bodies, with the stress of its F."""
+
+    g: object           # `fields.DeformationMap`, of points at rest; of several bodies, by number
+    law: tuple          # the elastic law's parameters (see materials), or `BodyLaws`
 
     @property
     def dim(self):
@@ -70,15 +102,10 @@ class ElasticMap(NamedTuple):
 
     def stress(self, X, xhat, F=None):
         """Return the Kirchhoff stress (n, d, d) [Pa] of F (n, d, d), if given, or of the map's."""
-        return elastic_stress(self.g.derivatives(X, xhat)[1] if F is None else F, self.law)
-
-
-class Portion(NamedTuple):
-    """The points of one body, and their law."""
-
-    first: int
-    last: int           # the number after its last
-    law: tuple
+        F = self.g.derivatives(X, xhat)[1] if F is None else F
+        if isinstance(self.law, BodyLaws):
+            return self.law.stress(X, F)
+        return elastic_stress(F, self.law)
 
 
 class ElasticModes(NamedTuple):
@@ -86,7 +113,7 @@ class ElasticModes(NamedTuple):
 
     fields: PodFields
     D: np.ndarray       # (n, d, d, R) dU/dX of modes [1/m]
-    bodies: tuple       # of `Portion`
+    laws: BodyLaws
 
     @property
     def X(self):
@@ -118,12 +145,7 @@ class ElasticModes(NamedTuple):
 
     def stress(self, points, xhat, F=None):
         """Return the Kirchhoff stress (m, d, d) [Pa] of F (m, d, d), if given, or of the map's."""
-        F = self.F(points, xhat) if F is None else F
-        tau = np.empty_like(F)
-        for body in self.bodies:
-            inside = (points >= body.first) & (points < body.last)
-            tau[inside] = elastic_stress(F[inside], body.law)
-        return tau
+        return self.laws.stress(points, self.F(points, xhat) if F is None else F)
 
     def affine(self, points, xhat):
         """Return C (m, d, d) [1/s], which is 0: there is no affine field."""
@@ -153,11 +175,9 @@ def elastic_modes(fields, bodies):
     """
     for body in bodies:
         require_neighbours(body.name, len(body.id), fields.dim)
-    ends = np.cumsum([0] + [len(body.id) for body in bodies])
-    portions = tuple(Portion(*pair, body.law)
-                     for pair, body in zip(pairwise(ends), bodies, strict=True))
-    D = [gradients(fields.X[p.first:p.last], fields.U[p.first:p.last]) for p in portions]
-    return ElasticModes(fields, np.concatenate(D), portions)
+    laws = body_laws(bodies)
+    D = [gradients(fields.X[p.first:p.last], fields.U[p.first:p.last]) for p in laws.portions]
+    return ElasticModes(fields, np.concatenate(D), laws)
 
 
 def require_neighbours(name, n, d):

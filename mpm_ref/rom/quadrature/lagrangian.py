@@ -22,10 +22,10 @@ CELLS = 2.0         # size of a block [dx]
 class Lagrangian(NamedTuple):
     """Material points as quadrature points, with their masses."""
 
-    X: np.ndarray       # (n, d) at rest [m]
+    X: np.ndarray       # (n, d) at rest [m]; of several bodies, numbers (n,)
     m: np.ndarray       # (n,)   mass [kg]
     V0: np.ndarray      # (n,)   volume at rest [m^d]
-    blocks: Blocks
+    blocks: Blocks      # or `BodyBlocks` of several bodies
     dx: float           # of the grid [m]
     degree: int         # of its splines
 

@@ -1,7 +1,7 @@
 """The full-order runs of a study: read from the folder where `generate` put them, or simulated.
 
-LDM's are `Snapshots` of one body, with deformation gradient and velocity; NSF's are `Histories` of
-all points of a scene, with stress and affine field, a frame at a time.
+LDM's are `Snapshots`, with deformation gradient and velocity; NSF's are `Histories`, with stress
+and affine field, a frame at a time. Both are of all points of a scene, one body after the other.
 """
 
 import numpy as np
@@ -40,15 +40,22 @@ def load(study, folder, numbers):
 
 def load_snapshots(study, folder, numbers):
     """Return the `Snapshots` of finished runs of LDM."""
-    body = study.base.body[0].name
     runs = []
     for k in numbers:
         with Results(file_of(folder, k)) as results:
-            runs.append(tuple(results.field(body, name) for name in ("x", "F", "v")))
+            runs.append(tuple(joined_field(results, name, 1) for name in ("x", "F", "v")))
     with Results(file_of(folder, numbers[0])) as results:
-        m, V0 = (results.field(body, name) for name in ("m", "V0"))
+        m, V0 = (joined_field(results, name, 0) for name in ("m", "V0"))
     x, F, v = (np.stack(field) for field in zip(*runs, strict=True))
     return Snapshots(x[0, 0].copy(), m, V0, study.mu[list(numbers)], x, F, v, study.base.dt)
+
+
+def joined_field(results, name, axis):
+    """Return a field of all bodies of a results file, in all frames, one body after the other along
+    an axis.
+    """
+    fields = [results.field(body, name) for body in results.bodies]
+    return fields[0] if len(fields) == 1 else np.concatenate(fields, axis)
 
 
 def load_histories(study, folder, numbers, kind=np.float32):

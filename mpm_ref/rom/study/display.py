@@ -1,7 +1,8 @@
 """The bodies of a reduced state, with all fields that a results file stores.
 
-LDM's map is continuous in space: its body is shown at any number of points, not only at those that
-it was trained with (LDM-sec5.2.1). NSF's fields are known at the points of their data.
+LDM's map is continuous in space: a single body is shown at any number of points, not only at those
+that it was trained with (LDM-sec5.2.1). Maps of several bodies, and NSF's fields, are known at the
+points of their data.
 """
 
 from typing import NamedTuple
@@ -22,10 +23,10 @@ from .full_model import FullModel
 
 
 class MapDisplay(NamedTuple):
-    """The body of a run of LDM, at n points."""
+    """A body of a run of LDM, at n points."""
 
     g: object           # the map, `tabulated` at these points
-    X: np.ndarray       # (n, d) at rest [m]
+    X: np.ndarray       # (n, d) at rest [m]; of several bodies, numbers (n,)
     body: Body          # these points with their masses, in their own order
     velocity: str       # one of `rom.latent.VELOCITIES`
 
@@ -44,6 +45,28 @@ class MapDisplay(NamedTuple):
         body = self.body._replace(particles=particles)
         initial_stress(body)
         return (body,)
+
+
+class BodiesDisplay(NamedTuple):
+    """The bodies of a run of LDM with several."""
+
+    parts: tuple        # of `MapDisplay`
+
+    @property
+    def count(self):
+        """Number of points."""
+        return sum(one.count for one in self.parts)
+
+    def bodies(self, latent, dt):
+        """Return the bodies in a reduced state; dt [s]: length of the step that led here."""
+        return sum((one.bodies(latent, dt) for one in self.parts), ())
+
+
+def bodies_display(g, full, velocity):
+    """Return the `BodiesDisplay` of a map of numbered points at those of a `FullModel`."""
+    points = zip(full.bodies, full.body_points, strict=True)
+    return BodiesDisplay(tuple(MapDisplay(g, numbers[body.id], body, velocity)
+                               for body, numbers in points))
 
 
 class FieldDisplay(NamedTuple):

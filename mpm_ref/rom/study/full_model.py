@@ -9,6 +9,7 @@ from ...core.surface import SurfaceConditions
 from ...materials import NoFlow
 from ...scene import build
 from ...shapes import Difference, Intersection, Union, level_set
+from ..fields.elastic import body_laws
 from ..step import MaterialPoints
 
 DAMPING = ("rpic", "relaxation", "mass_eps")    # keys of a scheme that reduced runs do not have
@@ -22,7 +23,7 @@ class FullModel(NamedTuple):
     m: np.ndarray           # (n,) mass [kg]
     V0: np.ndarray          # (n,) volume at rest [m^d]
     v: np.ndarray           # (n, d) velocity at the start [m/s]
-    shape: object = None    # of LDM's body at rest, as the scene has it
+    shape: object = None    # of LDM's single body at rest, as the scene has it
     boundary_points: tuple = ()     # of LDM: index arrays of the points within a cell, at the
                                     # start, of each prescribed region ...
     inner_points: tuple = ()        # ... and of those inside it at the start; none if it is fixed
@@ -31,6 +32,30 @@ class FullModel(NamedTuple):
     def rho(self):
         """The density at rest [kg/m^3]."""
         return float(self.m.sum() / self.V0.sum())
+
+    @property
+    def bodies(self):
+        """The bodies at the start."""
+        return self.problem.bodies
+
+    @property
+    def map_points(self):
+        """Names of all points as a map of LDM takes them: places at rest (n, d) [m] of a single
+        body, numbers (n,) of several.
+        """
+        return self.X if len(self.bodies) == 1 else np.arange(len(self.X))
+
+    @property
+    def body_points(self):
+        """The numbers of each body's points, of several bodies; none of a single one."""
+        ends = np.cumsum([len(body.id) for body in self.bodies])
+        points = np.split(np.arange(len(self.X)), ends[:-1])
+        return tuple(points) if len(points) > 1 else ()
+
+    @property
+    def law(self):
+        """The elastic law of a single body, or the `BodyLaws` of several."""
+        return self.bodies[0].law if len(self.bodies) == 1 else body_laws(self.bodies)
 
     @property
     def material(self):
@@ -59,14 +84,14 @@ class FullModel(NamedTuple):
 
 def ldm_full_model(scene):
     """Return the `FullModel` of a scene that LDM reduces. Raises ValueError for features that its
-    reduced runs do not have: more bodies, plastic flow, implicit steps, FLIP, relaxation and
+    reduced runs do not have: contact of bodies, plastic flow, implicit steps, FLIP, relaxation and
     damping of affine velocities, added mass, averaged volumes or splines, sources or sinks,
     conditions at surfaces, forces of single particles, a box.
     """
     problem = build(scene)
-    body = problem.bodies[0]
-    unsupported = {"more than one body": len(problem.bodies) > 1,
-                   "plastic flow": not isinstance(body.flow, NoFlow),
+    bodies = problem.bodies
+    unsupported = {"contact of bodies": bool(problem.contacts),
+                   "plastic flow": not all(isinstance(body.flow, NoFlow) for body in bodies),
                    f"the {problem.integrator} integrator": problem.integrator != "explicit",
                    "the transfer flip": problem.scheme.transfer == "flip",
                    **{f"scheme.{key}": getattr(problem.scheme, key) > 0.0 for key in DAMPING},
@@ -75,7 +100,8 @@ def ldm_full_model(scene):
                    "averaged splines (gimp)": problem.scheme.gimp > 0.0,
                    "sources or sinks": problem.sources or problem.sinks,
                    'boundary = "surface"': isinstance(problem.conditions, SurfaceConditions),
-                   "forces of single particles": body.particles.b.ndim > 1,
+                   "forces of single particles": any(body.particles.b.ndim > 1
+                                                     for body in bodies),
                    "a box that clips": problem.clip is not None}
     for feature in (name for name, present in unsupported.items() if present):
         raise ValueError(f"the scene {problem.title!r} has {feature}: reduced runs know none")
@@ -84,7 +110,8 @@ def ldm_full_model(scene):
     boundary = tuple(np.flatnonzero(distances(X, one.shape) <= problem.dx) for one in regions)
     inner = tuple(np.flatnonzero((distances(X, one.shape) <= 0.0) & one.motion.moves)
                   for one in regions)
-    return FullModel(problem, X, m, V0, v, scene.body[0].shape, boundary, inner)
+    shape = scene.body[0].shape if len(bodies) == 1 else None
+    return FullModel(problem, X, m, V0, v, shape, boundary, inner)
 
 
 def nsf_full_model(scene):

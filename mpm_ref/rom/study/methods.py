@@ -7,8 +7,9 @@ import numpy as np
 
 from ...scene import SceneError, build
 from ...store.writer import StoredFields
+from ..fields.numbered import numbered
 from .dataset import load_histories, load_snapshots
-from .display import FieldDisplay, map_display, resampled
+from .display import FieldDisplay, bodies_display, map_display, resampled
 from .evaluate import ReferenceRun, history_reference
 from .full_model import ldm_full_model, nsf_full_model
 from .monitor import field_monitor, map_monitor, sample_warnings
@@ -19,10 +20,11 @@ from .reduce import (
     fields_misfit,
     fields_of_run,
     map_misfit,
+    require_modes,
     train_fields,
     train_map,
 )
-from .run import FieldRunOptions, ldm_run, nsf_run
+from .run import FieldRunOptions, ldm_run, nsf_run, require_known_quadrature
 from .samples import ENOUGH, chosen_samples, random_draw, require_enough_samples
 from .tables import LDM, NSF
 
@@ -36,7 +38,7 @@ class ReductionMethod:
     parameters: str             # in words: what may be varied
     frame_spacing: Callable     # (scene, changes) -> steps from one stored state to the next
     full_model: Callable        # scene -> `FullModel`; raises ValueError
-    require_samples: Callable   # (study, full): raises ValueError for too few samples
+    require_options: Callable   # (study, full): raises ValueError for options that do not suit it
     load: Callable              # (study, folder, numbers) -> `Snapshots` or `Histories`
     compute: Callable           # (study, data) -> field of modes, latent coordinates, those at rest
     train: Callable             # (study, data, about, checkpoint, on_epoch, machine) -> `Model`
@@ -58,6 +60,19 @@ def every_step(base, changes):
     return 1
 
 
+def require_ldm_options(study, full):
+    """Raise ValueError for a map, or a quadrature, that a `FullModel` of several bodies has not."""
+    require_modes(study)
+    require_known_quadrature(full, study.tables.run.options)
+
+
+def map_of_run(g, full, mu):
+    """Return the map of a run of a `FullModel`, whose points are places at rest of a single body,
+    and numbers of several.
+    """
+    return g if len(full.bodies) == 1 else numbered(g)
+
+
 def ldm_reduced_run(study, full, g, rest):
     """Return LDM's `ReducedRun` as a study asks for it. Raises ValueError for samples that do not
     suffice, and a precision that the map has not.
@@ -70,13 +85,18 @@ def ldm_reduced_run(study, full, g, rest):
 
 def ldm_recording(study, full, g, model, facts, count):
     """Return the `Recording` of a run of LDM, at `count` points of the body's shape; None: at those
-    of the study.
+    of the study. Raises ValueError for a number of points of several bodies.
     """
     table, scene = study.tables.run, full.problem
+    several = len(full.bodies) > 1
+    if several and count is not None:
+        raise ValueError(f"--points-out {count}: reduced runs of several bodies are shown at "
+                         f"their own {len(full.X)} points; leave it out")
     run = ldm_reduced_run(study, full, g, model.rest)
     mu = list(facts["parameters"].values())
     shown = scene if count is None else build(resampled(study.scene(mu), count))
-    display = map_display(g, shown.bodies[0], table.velocity)
+    display = (bodies_display(g, full, table.velocity) if several
+               else map_display(g, shown.bodies[0], table.velocity))
     return Recording(run, map_monitor(full, g, model.xhat), display, shown, table, facts,
                      LDM_SERIES, LDM_METHOD.shown_fields)
 
@@ -131,18 +151,18 @@ def nsf_recording(study, full, fields, model, facts, count):
 LDM_METHOD = ReductionMethod(
     stored=("x", "F", "v"), free_fields=("material", "velocity"),
     parameters="gravity, a material, a motion or a velocity at the start",
-    frame_spacing=every_step, full_model=ldm_full_model, require_samples=lambda study, full: None,
+    frame_spacing=every_step, full_model=ldm_full_model, require_options=require_ldm_options,
     load=load_snapshots, compute=compute_map, train=train_map, misfit=map_misfit,
-    field_of_run=lambda g, full, mu: g, reduced_run=ldm_reduced_run, recording=ldm_recording,
+    field_of_run=map_of_run, reduced_run=ldm_reduced_run, recording=ldm_recording,
     reference=lambda full, data, k: ReferenceRun(full.X, data.x[k], None),
-    point_names=lambda full: full.X, search_points=lambda full: slice(None),
+    point_names=lambda full: full.map_points, search_points=lambda full: slice(None),
     shown_fields=StoredFields(), first_level=0)
 
 NSF_METHOD = ReductionMethod(
     stored=("x", "C", "tau"), free_fields=("material", "velocity"),
     parameters="gravity, a material, a motion or a velocity at the start",
     frame_spacing=stored_spacing, full_model=nsf_full_model,
-    require_samples=lambda study, full: require_enough_samples(study.tables.run, full.X,
+    require_options=lambda study, full: require_enough_samples(study.tables.run, full.X,
                                                                study.tables.reduced_model.r),
     load=load_histories, compute=compute_fields, train=train_fields, misfit=fields_misfit,
     field_of_run=fields_of_run, reduced_run=nsf_reduced_run, recording=nsf_recording,

@@ -142,11 +142,18 @@ class MapMonitor(NamedTuple):
     axes: np.ndarray        # of the body's extent (see `principal_axes`)
     seal: dict              # of the map (see `rom.integrity`)
     paths: Paths | None = None      # of the training runs
+    numbers: np.ndarray | None = None       # (N,) of all points, by which the map of several bodies
+                                            # takes them; None: by their places at rest
 
     @property
     def field(self):
         """Return the map of the run."""
         return self.g
+
+    @property
+    def checked(self):
+        """The points that are checked, as the map takes them."""
+        return self.X if self.numbers is None else evenly(self.numbers, CHECKED)
 
     def check(self, state, last=None):
         """Return the `StateCheck` of a `RunState`, whose predecessor's was `last`; raises
@@ -154,15 +161,16 @@ class MapMonitor(NamedTuple):
         """
         latent, report = state.latent, state.report
         with np.errstate(all="ignore"):
-            x, F, G = self.g.derivatives(self.X, latent.xhat)
+            x, F, G = self.g.derivatives(self.checked, latent.xhat)
             J = np.linalg.det(F)
             off = float(np.sqrt(np.mean(np.sum((x - self.X) ** 2, axis=1))))
         measures = {"off": off / self.dx, "blind": 0, "most_off": OFF}
         if report is not None:
             lost = report.quadrature.get("lost", 0)
-            X_samples = self.all_points[state.samples.points]
-            X = evenly(X_samples, CHECKED)
-            shown = coverage(G, self.g.derivatives(X, latent.xhat)[2])
+            samples = state.samples.points
+            X_samples = self.all_points[samples]
+            some = evenly(X_samples if self.numbers is None else samples, CHECKED)
+            shown = coverage(G, self.g.derivatives(some, latent.xhat)[2])
             spread_now = spread(X_samples, self.axes)
             measures = {"off": report.residual * self.dt / self.dx,
                         "coverage": MEMORY * last.coverage + (1.0 - MEMORY) * shown,
@@ -178,7 +186,7 @@ class MapMonitor(NamedTuple):
     def describe(self, latent):
         """Return the place of the smallest det F of a state without body, in words."""
         with np.errstate(all="ignore"):
-            J = np.linalg.det(self.g.derivatives(self.X, latent.xhat)[1])
+            J = np.linalg.det(self.g.derivatives(self.checked, latent.xhat)[1])
         p = int(np.argmin(np.where(np.isfinite(J), J, -np.inf)))
         place = ", ".join(f"{a:.3g}" for a in self.X[p])
         return f"det F is least at X = {place} m, {float(J[p]):.3g}"
@@ -210,9 +218,11 @@ def map_monitor(full, g, xhat):
     """Return the `MapMonitor` of runs of a `FullModel` on a map with training latents xhat (s,
     k + 1, r). Raises ValueError where these do not differ.
     """
-    X, problem, inside = evenly(full.X, CHECKED), full.problem, trained_extent(g, full.X, xhat)
+    X, problem = evenly(full.X, CHECKED), full.problem
+    inside = trained_extent(g, full.map_points, xhat)
+    numbers = full.map_points if len(full.bodies) > 1 else None
     return MapMonitor(g, X, inside, problem.dx, problem.clock.dt, full.X, principal_axes(full.X),
-                      seal(g), trained_paths(inside, xhat))
+                      seal(g), trained_paths(inside, xhat), numbers)
 
 
 def field_monitor(fields, xhat, spacing=1.0):

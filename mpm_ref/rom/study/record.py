@@ -109,10 +109,11 @@ def recording(study, model, mu, count=None):
 
 def supported_model(study, mu):
     """Return the `FullModel` of a study's run with parameters mu. Raises ValueError for a scene
-    that reduced runs do not support, and with NSF for samples that do not suffice.
+    that reduced runs do not support, and for options that do not suit it: with NSF samples that do
+    not suffice, with LDM a map or a quadrature of a single body for several.
     """
     full = study.method.full_model(study.scene(mu))
-    study.method.require_samples(study, full)
+    study.method.require_options(study, full)
     return full
 
 

@@ -13,9 +13,10 @@ from ...store.manifest import source_hash, versions
 from ...training import import_with_torch
 from .. import model_file
 from ..fields.network import Networks, learned_fields
-from ..fields.pod import basis
+from ..fields.numbered import numbered
+from ..fields.pod import PodModes, basis
 from ..fields.pod_fields import fit_pod_fields
-from ..fields.polynomial_manifold import curved
+from ..fields.polynomial_manifold import Curved, curved
 from ..latent import initial
 from ..model_file import Model
 from .errors import misfit
@@ -76,8 +77,19 @@ def compute_map(study, snapshots):
     return g, xhat, np.zeros(settings.r)
 
 
+def require_modes(study):
+    """Raise ValueError for a map of several bodies that is a network."""
+    bodies = len(study.base.body)
+    if bodies > 1 and study.tables.reduced_model.kind == NETWORK:
+        raise ValueError(f"map.kind = {NETWORK!r} with {bodies} bodies: expected {MODES!r} or "
+                         f"{CURVED!r}, since a network is one continuous map of the body at rest")
+
+
 def train_map(study, snapshots, about, checkpoint, on_epoch, machine):
-    """Return the `Model` of a decoder trained on `Snapshots`."""
+    """Return the `Model` of a decoder trained on `Snapshots`. Raises ValueError as `require_modes`
+    does.
+    """
+    require_modes(study)
     settings = {name: getattr(study.tables.reduced_model, name) for name in ("r", *KEYS[NETWORK])}
     settings["weights"] = trainer().loss_weights(settings["weights"], *size_ratios(study.base))
     trained = trainer().fit_decoder(settings, snapshots, checkpoint, on_epoch, machine)
@@ -103,7 +115,11 @@ def size_ratios(scene):
 
 
 def map_misfit(g, snapshots, xhat):
-    """Return the `PositionErrors` of a map's positions in its `Snapshots`."""
+    """Return the `PositionErrors` of a map's positions in its `Snapshots`; of modes by the numbers
+    of points, as two bodies may have points in one place.
+    """
+    if isinstance(g, PodModes | Curved):
+        return misfit(numbered(g), np.arange(len(snapshots.X)), snapshots, xhat)
     return misfit(g, snapshots.X, snapshots, xhat)
 
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from ...sampling import Regular, sample
 from ...shapes.inside import solid
+from ..fields.blocks import body_blocks
 from ..kinematics import CLOSE
 from ..latent import Latent, initial, nearest
 from ..quadrature.eulerian import Eulerian
-from ..quadrature.lagrangian import Resampled, lagrangian
+from ..quadrature.lagrangian import CELLS, Lagrangian, Resampled, lagrangian
 from ..step import StepReport, ldm_stepper, nsf_stepper
 from .full_model import signed_distance
 from .samples import (
@@ -108,8 +109,10 @@ def ldm_run(full, g, options, rest, seed=0):
 
 def ldm_model(full, g, options):
     """Return LDM's `ReducedStepper` of a `FullModel` on a map g. Raises ValueError for a quadrature
-    that does not exist, and as `require_driven_points` and `with_precision` do.
+    that does not exist, and as `require_known_quadrature`, `require_driven_points` and
+    `with_precision` do.
     """
+    require_known_quadrature(full, options)
     require_driven_points(full, options)
     problem = full.problem
     make = {"lagrangian": material_quadrature, "eulerian": cell_quadrature,
@@ -118,9 +121,18 @@ def ldm_model(full, g, options):
         raise ValueError(f"quadrature = {options.quadrature!r}: expected one of {', '.join(make)}")
     transfer = problem.scheme.transfer
     return ldm_stepper(with_precision(g, options, transfer),
-                       make[options.quadrature](full, options), problem.bodies[0].law,
-                       problem.gravity, options.projection, conditions=problem.conditions,
-                       velocity=options.velocity, transfer=transfer)
+                       make[options.quadrature](full, options), full.law, problem.gravity,
+                       options.projection, conditions=problem.conditions,
+                       velocity=options.velocity, transfer=transfer,
+                       v0=full.v if len(full.bodies) > 1 else None)
+
+
+def require_known_quadrature(full, options):
+    """Raise ValueError for a quadrature of several bodies other than by their material points."""
+    if len(full.bodies) > 1 and options.quadrature != QUADRATURES[0]:
+        raise ValueError(f"quadrature = {options.quadrature!r} with {len(full.bodies)} bodies: "
+                         f"expected {QUADRATURES[0]!r}, since its other points have one shape, one "
+                         "density and one law")
 
 
 def with_precision(g, options, transfer):
@@ -145,7 +157,12 @@ def with_precision(g, options, transfer):
 
 def material_quadrature(full, options):
     """Return the quadrature with the material points of a `FullModel`."""
-    return lagrangian(full.X, full.m, full.V0, full.problem.dx, full.problem.scheme.degree)
+    dx, degree = full.problem.dx, full.problem.scheme.degree
+    if len(full.bodies) == 1:
+        return lagrangian(full.X, full.m, full.V0, dx, degree)
+    sizes = [len(body.id) for body in full.bodies]
+    return Lagrangian(full.map_points, full.m, full.V0, body_blocks(full.X, sizes, CELLS * dx), dx,
+                      degree)
 
 
 def cell_quadrature(full, options):
@@ -170,7 +187,7 @@ def ldm_start(full, g, rest):
     """
     some = slice(None, None, -(-len(full.X) // ENOUGH))
     v = full.v[some] if np.any(full.v) else None
-    return initial(g, full.X[some], v=v, xhat=rest)
+    return initial(g, full.map_points[some], full.X[some], v, rest)
 
 
 # NSF.

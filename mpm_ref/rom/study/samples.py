@@ -44,7 +44,7 @@ def ldm_sampler(full, g, options, xhat, seed):
     if options.samples == "kept":
         points = random_draw(full, g, options)(rng)
     elif options.samples == "pivoted":
-        points = pivoted_samples(full.X, random_draw(full, g, options),
+        points = pivoted_samples(full.map_points, random_draw(full, g, options),
                                  lambda X: g.derivatives(X, xhat)[2], rng)
     else:
         raise ValueError(f"samples = {options.samples!r}: expected redrawn, kept or pivoted")
@@ -81,7 +81,7 @@ def random_draw(full, g, options, t=0.0):
 
 
 def pivoted_samples(X, draw, G, rng):
-    """Return the sorted numbers of the samples of a `Draw` from points X (n, d): those of its
+    """Return the sorted numbers of the samples of a `Draw` from points X (n, ..): those of its
     groups at random, the others pivoted by dg/dxhat, G(X).
     """
     forced = np.unique(np.concatenate([np.empty(0, dtype=int), *(
@@ -93,11 +93,11 @@ def pivoted_samples(X, draw, G, rng):
 
 
 def boundary_groups(full, options, t):
-    """Return the groups of points that samples must not miss: none where all points are samples, or
-    where these groups would be more than half of them, since fixed points say little of the body's
-    motion.
+    """Return the groups of points that samples must not miss, also each of several bodies: none
+    where all points are samples, or where these groups would be more than half of them, since fixed
+    points say little of the body's motion.
     """
-    groups = full.constrained_points(t)
+    groups = full.constrained_points(t) + full.body_points
     return groups if options.points and options.points >= 2 * PER_GROUP * len(groups) else ()
 
 
