@@ -136,8 +136,7 @@ def test_a_region_that_was_let_go_asks_for_no_samples():
     (with_(GRAVITY.scene(1.0), scheme=Scheme(transfer="pic", gimp=2.0)), r"\(gimp\)"),
     (with_(GRAVITY.scene(1.0), scheme=Scheme(transfer="pic", precision="single")), "single"),
     (catalogue_scene("nsf_metal"), "plastic flow"),
-    (catalogue_scene("colliding_disks"), "more than one body"),
-], ids=["transfer", "volumes", "splines", "precision", "plastic", "bodies"])
+], ids=["transfer", "volumes", "splines", "precision", "plastic"])
 def test_what_a_reduced_run_does_not_know_is_refused(scene, said):
     with pytest.raises(ValueError, match=said):
         ldm_full_model(scene)
