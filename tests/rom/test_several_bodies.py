@@ -16,8 +16,10 @@ from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.rom.latent import Latent
 from mpm_ref.rom.quadrature.lagrangian import lagrangian
 from mpm_ref.rom.sampling import PER_GROUP
+from mpm_ref.rom.snapshots import Snapshots
 from mpm_ref.rom.step import ldm_stepper
 from mpm_ref.rom.study.full_model import field_of, ldm_full_model
+from mpm_ref.rom.study.reduce import map_misfit
 from mpm_ref.rom.study.run import RunOptions, ldm_model, ldm_run
 from mpm_ref.rom.study.samples import random_draw
 from mpm_ref.scene import build, loads
@@ -170,6 +172,20 @@ def test_modes_by_number_are_those_at_the_points_of_the_data(d):
             assert np.array_equal(a, b)
         assert np.array_equal(by_number.velocity(points, y, 2.0 * y),
                               g.velocity(X[points], y, 2.0 * y))
+
+
+@pytest.mark.parametrize("kind", ["modes", "curved"])
+def test_misfit_tells_points_in_one_place_apart(d, kind):
+    X, rng = np.concatenate([cloud(d, 20)] * 2), np.random.default_rng(6)
+    xhat = rng.normal(size=(8, 1)) * np.array([1.0, 1.0])
+    xhat[:, 1] **= 2
+    x = X + np.einsum("sr,ndr->snd", xhat, rng.normal(size=(40, d, 2)))
+    F = np.tile(np.eye(d), (8, 40, 1, 1))
+    straight = basis(X, x, F, 2)
+    g = straight.modes if kind == "modes" else curved(straight, 1, 3)
+    runs = Snapshots(X, None, None, None, x[:, None], None, None, 1.0)
+    found = map_misfit(g, runs, straight.xhat[:, None, :g.r])
+    assert found.displacement < (1e-12 if kind == "modes" else 0.5)
 
 
 def test_other_maps_have_no_numbers(d):

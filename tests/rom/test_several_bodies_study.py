@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from command_line import assert_told, mpm_ref
-from two_blocks import SCENE, STEPS, write
+from two_blocks import STEPS, write
 
 from mpm_ref.rom.study import dataset, evaluate, generate, reduce
 from mpm_ref.rom.study.study import load
@@ -82,21 +82,6 @@ def test_a_curved_map_is_one_of_several_bodies_too(made):
     one, = evaluate.evaluate(study, model, held_out)
     assert not one.breakdowns
     assert one.paths["reduced"].errors.displacement < 0.1
-
-
-def test_points_in_one_place_are_told_apart(tmp_path):
-    """Two blocks in each other: the misfit of their modes is round-off, by number."""
-    scene = SCENE.replace("lower = [0.1, 0.2], upper = [0.5, 0.4]",
-                          "lower = [0.1, 0.0], upper = [0.5, 0.2]")
-    study = load(write(tmp_path, ("r = 6", "r = 12"), scene=scene))
-    (tmp_path / "data").mkdir()
-    assert all(one.has_data for one in generate.generate(study, tmp_path / "data"))
-    data = dataset.load(study, tmp_path / "data", study.train)
-    assert len(np.unique(data.X.round(9), axis=0)) == 48 < len(data.X)
-    model = reduce.compute_model(study, data, {})
-    assert model.about["fit"]["errors"]["displacement"] < 1e-3
-    one, = evaluate.evaluate(study, model, dataset.load(study, tmp_path / "data", study.test))
-    assert one.paths["reduced"].errors.displacement < 0.02
 
 
 @pytest.mark.parametrize(("edit", "words"), [
