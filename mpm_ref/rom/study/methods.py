@@ -24,7 +24,7 @@ from .reduce import (
     train_fields,
     train_map,
 )
-from .run import FieldRunOptions, ldm_run, nsf_run, require_known_quadrature
+from .run import FieldRunOptions, ldm_run, nsf_run, require_own_points
 from .samples import ENOUGH, chosen_samples, random_draw, require_enough_samples
 from .tables import LDM, NSF
 
@@ -63,7 +63,7 @@ def every_step(base, changes):
 def require_ldm_options(study, full):
     """Raise ValueError for a map, or a quadrature, that a `FullModel` of several bodies has not."""
     require_modes(study)
-    require_known_quadrature(full, study.tables.run.options)
+    require_own_points(full, study.tables.run.options)
 
 
 def map_of_run(g, full, mu):

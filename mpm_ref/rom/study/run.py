@@ -109,10 +109,10 @@ def ldm_run(full, g, options, rest, seed=0):
 
 def ldm_model(full, g, options):
     """Return LDM's `ReducedStepper` of a `FullModel` on a map g. Raises ValueError for a quadrature
-    that does not exist, and as `require_known_quadrature`, `require_driven_points` and
+    that does not exist, and as `require_own_points`, `require_driven_points` and
     `with_precision` do.
     """
-    require_known_quadrature(full, options)
+    require_own_points(full, options)
     require_driven_points(full, options)
     problem = full.problem
     make = {"lagrangian": material_quadrature, "eulerian": cell_quadrature,
@@ -127,7 +127,7 @@ def ldm_model(full, g, options):
                        v0=full.v if len(full.bodies) > 1 else None)
 
 
-def require_known_quadrature(full, options):
+def require_own_points(full, options):
     """Raise ValueError for a quadrature of several bodies other than by their material points."""
     if len(full.bodies) > 1 and options.quadrature != QUADRATURES[0]:
         raise ValueError(f"quadrature = {options.quadrature!r} with {len(full.bodies)} bodies: "
