@@ -178,8 +178,11 @@ def fields_line(facts):
     """Return fields and reduced runs of a study as text."""
     map, run = facts["map"], facts["run"]
     longer = f", steps {run['dt_factor']:g} times as long" if run["dt_factor"] != 1.0 else ""
+    tolerance, single = run.get("inversion_tolerance"), run.get("precision") == "single"
+    stop = f" to {tolerance:g}" if tolerance else ""
     return (f"stress fields: {map['kind']}, r = {map['r']}, {sizes_text(map)}; reduced runs: "
-            f"{run['inversion']} inversion, {samples_text(run)}{longer}")
+            f"{run['inversion']} inversion{stop}, {samples_text(run)}{longer}"
+            f"{', single precision' if single else ''}")
 
 
 def samples_text(run):

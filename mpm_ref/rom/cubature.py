@@ -45,7 +45,7 @@ def cubature(U, r, candidates, count, cell=None):
     if cell is None and not r <= count * U.shape[1]:
         raise ValueError(f"{count} samples for {r} latent coordinates: expected at least "
                          f"{-(-r // U.shape[1])}")
-    V = U[candidates]
+    V = U[candidates].astype(float, copy=False)
     A = np.einsum("pdk,pdl->klp", V[:, :, :r], V).reshape(-1, len(V))
     b = np.eye(r, U.shape[2]).ravel()
     with one_thread():
@@ -62,7 +62,8 @@ def cubature(U, r, candidates, count, cell=None):
 
 def misfit(U, r, points):
     """Return the `Cubature.misfit` of points that all have the best common weight; 0 .. 1."""
-    products = np.einsum("pdk,pdl->kl", U[points][:, :, :r], U[points])
+    V = U[points].astype(float, copy=False)
+    products = np.einsum("pdk,pdl->kl", V[:, :, :r], V)
     wanted = np.eye(r, U.shape[2])
     scale = np.sum(products * wanted) / max(np.sum(products**2), np.finfo(float).tiny)
     return float(np.linalg.norm(scale * products - wanted) / np.linalg.norm(wanted))

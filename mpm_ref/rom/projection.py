@@ -81,14 +81,19 @@ class PositionInversion:
     """NSF's projection: latent coordinates whose positions of the samples are nearest (NSF-eq10).
 
     kind is "nonlinear", Gauss-Newton from the latent coordinates before the step, or "linear": its
-    first step alone. Raises ValueError for another one.
+    first step alone. Gauss-Newton ends where it moves no coordinate by more than the tolerance
+    times the largest one before the step; None: as `project_position` ends. Raises ValueError for
+    another kind, and for a tolerance that is not positive or belongs to "linear".
     """
 
     kind: str = "nonlinear"
+    tolerance: float | None = None
 
     def __post_init__(self):
         if self.kind not in INVERSIONS:
             raise ValueError(f"inversion = {self.kind!r}: expected " + " or ".join(INVERSIONS))
+        if self.tolerance is not None:
+            require_tolerance(self.tolerance, self.kind)
 
     def __call__(self, field, latent, samples, trial, dt, weights=None):
         """Return `Projected` from the `Kinematics` of samples and their trial particles; samples
@@ -99,11 +104,21 @@ class PositionInversion:
             field = WeightedField(field, np.sqrt(weights)[:, None])
             x = field.root * x
         if self.kind == "nonlinear":
-            fit = project_position(field, points, x, latent.xhat)
+            least = None if self.tolerance is None else self.tolerance * np.abs(latent.xhat).max()
+            fit = project_position(field, points, x, latent.xhat, least)
             return Projected(fit.y, None, fit)
         x_start, _, G = field.derivatives(points, latent.xhat)
         fit = project_velocity(G, (x - x_start) / dt)
         return Projected(latent.xhat + dt * fit.y, None, fit._replace(residual=dt * fit.residual))
+
+
+def require_tolerance(tolerance, inversion):
+    """Raise ValueError for a tolerance of an inversion that cannot be, or has no effect."""
+    if not 0.0 < tolerance < np.inf:
+        raise ValueError(f"inversion_tolerance = {tolerance:g}: expected a positive number")
+    if inversion == "linear":
+        raise ValueError(f"inversion_tolerance = {tolerance:g}: expected none with inversion = "
+                         "'linear', which takes one step and no more")
 
 
 class WeightedField(NamedTuple):
@@ -137,9 +152,11 @@ def project_velocity(G, v):
     return Fit(w, rms(A @ w - b, len(G)), rank)
 
 
-def project_position(field, points, x, y):
+def project_position(field, points, x, y, least=None):
     """Return the `Fit` of coordinates: argmin_y sum_p || g(X_p; y) - x_p ||^2 (LDM-eq22), by
-    Gauss-Newton with backtracking from y (LDM-sec3.2.3-gn); x (n, d) are trial positions [m].
+    Gauss-Newton with backtracking from y (LDM-sec3.2.3-gn); x (n, d) are trial positions [m]. It
+    ends where the step of every coordinate is at most `least` (None: SMALL of their size), or only
+    round-off is left to gain.
     """
     at, _, G = field.derivatives(points, y)
     error, rank, rounds, ended = np.sum((at - x) ** 2), field.r, 0, False
@@ -155,7 +172,8 @@ def project_position(field, points, x, y):
         ended = y_new is None
         if ended:
             break
-        ended = np.abs(y_new - y).max() <= SMALL * max(1.0, np.abs(y).max())
+        enough = SMALL * max(1.0, np.abs(y).max()) if least is None else least
+        ended = np.abs(y_new - y).max() <= enough
         y, error = y_new, error_new
         if ended:
             break

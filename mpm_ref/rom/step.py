@@ -33,6 +33,7 @@ from .projection import PositionInversion, RateProjection
 from .quadrature import Quadrature
 from .quadrature.lagrangian import NumberedPoints
 
+GAUSS_NEWTON = PositionInversion()
 BREAKDOWNS = (NoBody, OutOfRange, np.linalg.LinAlgError)    # with which a run may end midway
 
 
@@ -191,11 +192,11 @@ def ldm_stepper(g, quadrature, law, gravity, projection="linear", **options):
                           **options)
 
 
-def nsf_stepper(fields, material, dx, degree, gravity, inversion="nonlinear", **options):
+def nsf_stepper(fields, material, dx, degree, gravity, inversion=GAUSS_NEWTON, **options):
     """Return the `ReducedStepper` of NSF (NSF-sec5.2) on fields of `MaterialPoints`, on a grid of
-    spacing dx [m] with splines of a degree; inversion: see `projection.PositionInversion`; options:
+    spacing dx [m] with splines of a degree; inversion: a `projection.PositionInversion`; options:
     conditions.
     """
     quadrature = NumberedPoints(material.m, material.V0, dx, degree)
-    return ReducedStepper(fields, quadrature, PositionInversion(inversion), gravity,
-                          transfer="apic", velocity="difference", v0=material.v, **options)
+    return ReducedStepper(fields, quadrature, inversion, gravity, transfer="apic",
+                          velocity="difference", v0=material.v, **options)

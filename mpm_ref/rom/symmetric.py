@@ -13,7 +13,6 @@ def values(a):
 def tensor(a, d):
     """Return the symmetric tensors (.., d, d) of values a (.., d (d + 1) / 2)."""
     rows, columns = np.triu_indices(d)
-    full = np.empty((*a.shape[:-1], d, d))
-    full[..., rows, columns] = a
-    full[..., columns, rows] = a
-    return full
+    place = np.empty((d, d), dtype=int)
+    place[rows, columns] = place[columns, rows] = np.arange(len(rows))
+    return a.take(place, axis=-1).astype(float, copy=False)

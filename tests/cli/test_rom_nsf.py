@@ -140,6 +140,7 @@ def test_fields_of_a_single_run_ignore_its_parameter(tmp_path):
 @pytest.mark.parametrize(("way", "plan"), [
     ("points = 20", (20, 0)),
     ('points = 9\nseed = 3\ndt_factor = 2.0\ninversion = "linear"', (9, 3, 2.0, "linear")),
+    ("points = 9\ninversion_tolerance = 1e-6", (9, 0, 1.0, "nonlinear", 1e-6)),
     ("", (None, 0)),
 ])
 def test_a_run_is_the_reduced_run_of_its_parameters(made, reduced, tmp_path, way, plan):
@@ -163,6 +164,25 @@ def test_a_run_is_the_reduced_run_of_its_parameters(made, reduced, tmp_path, way
         assert np.array_equal(of_both("v", 0), one.v)
         step = (of_both("x", 4) - of_both("x", 3)) / np.diff(results.time[3:5])
         np.testing.assert_allclose(of_both("v", 4), step, rtol=1e-12, atol=1e-12)
+
+
+def test_a_run_in_single_precision_is_one_on_rounded_modes(made, reduced, tmp_path):
+    """Whose bytes are half as many, and which hardly moves."""
+    study = write(tmp_path, ("points = 20", 'points = 20\nprecision = "single"'))
+    exact, rounded = (reduce.load(made / "fields.npz", load(path)).field
+                      for path in (made / "pairs.toml", study))
+    for ours, theirs in zip((rounded.U, rounded.tau.modes, rounded.C.modes),
+                            (exact.U, exact.tau.modes, exact.C.modes), strict=True):
+        assert (ours.dtype, theirs.dtype) == (np.float32, float)
+        assert np.array_equal(ours, theirs.astype(np.float32))
+    _, double = reduced("--set", "v=1.9")
+    done, single = reduced("--set", "v=1.9", study=study, out=tmp_path / "single.h5")
+    assert (done.exit_code, done.stderr) == (0, "")
+    with h5py.File(double) as ours, h5py.File(single) as theirs:
+        for name in ("bodies/soft/x", "bodies/hard/tau"):
+            apart = np.abs(theirs[name][()] - ours[name][()]).max()
+            assert 0.0 < apart < 1e-5 * np.abs(ours[name][()]).max()
+    assert "20 points, single precision" in mpm_ref("info", study).stdout
 
 
 def test_a_run_that_was_cut_off_goes_on_bit_for_bit(reduced, tmp_path, monkeypatch):

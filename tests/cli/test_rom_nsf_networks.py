@@ -93,6 +93,14 @@ def test_a_run_is_one_on_the_networks(made, study, tmp_path):
     assert json.loads(done.stdout)["reduced"]["map"]["kind"] == "network"
 
 
+def test_networks_have_no_single_precision(made, tmp_path):
+    study = write(tmp_path, ("points = 20", 'points = 20\nprecision = "single"'))
+    done = mpm_ref("rom", "run", study, "--map", made / "nets.npz", "--set", "v=1.9", "--out",
+                   tmp_path / "run.h5")
+    assert_told(done, 2, "run.precision = 'single': expected 'double' for fields of kind 'network'")
+    assert not (tmp_path / "run.h5").exists()
+
+
 def test_networks_are_evaluated_and_described(made, tmp_path):
     done = mpm_ref("rom", "evaluate", made / "pairs.toml", "--map", made / "nets.npz", "--data",
                    made / "data", "--out", tmp_path / "e.png", "--json")

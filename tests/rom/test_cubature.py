@@ -39,6 +39,15 @@ def test_weights_beat_none(modes):
     assert off(modes, found.points, found.w) < 0.1 * min(others)
 
 
+def test_products_of_single_modes_are_double(modes):
+    single = modes.astype(np.float32)
+    ours, exact = (cubature(U, R_FREE, np.arange(N), 20) for U in (single, single.astype(float)))
+    assert np.array_equal(ours.w, exact.w)
+    assert ours.misfit == exact.misfit
+    points = np.arange(0, N, 9)
+    assert misfit(single, R_FREE, points) == misfit(single.astype(float), R_FREE, points)
+
+
 def test_what_is_left_is_told(modes):
     found = cubature(modes, R_FREE, np.arange(N), 6)
     assert found.misfit > 0.05

@@ -13,6 +13,7 @@ from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.fields.blocks import blocks
 from mpm_ref.rom.kinematics import Kinematics, NoBody
 from mpm_ref.rom.latent import Latent, nearest
+from mpm_ref.rom.projection import PositionInversion
 from mpm_ref.rom.quadrature import Cloud
 from mpm_ref.rom.step import MaterialPoints, nsf_stepper
 
@@ -192,7 +193,7 @@ def test_free_affine_motion_is_exact_with_steps_of_any_length(d, faster, inversi
     X, matter = body(500, d)
     L, c = rng.normal(size=(d, d)), rng.normal(size=d)
     matter = matter._replace(v=X @ L.T + c)
-    stepper = model(Free(X, L), matter, gravity=np.zeros(3), inversion=inversion)
+    stepper = model(Free(X, L), matter, gravity=np.zeros(3), inversion=PositionInversion(inversion))
     at, samples = Latent(Affine(d).rest), np.arange(0, 500, 60)
     for k in range(4):
         at, report = stepper.step(at, samples, k * faster * DT, faster * DT)
@@ -249,7 +250,7 @@ def test_latent_coordinates_that_are_lost_end_a_run(d):
 def test_unknown_inversion_is_refused():
     X, matter = body(40, 2)
     with pytest.raises(ValueError, match="inversion = 'quick': expected nonlinear or linear"):
-        model(Free(X, np.eye(2)), matter, inversion="quick")
+        model(Free(X, np.eye(2)), matter, inversion=PositionInversion("quick"))
 
 
 def test_states_of_a_full_run_differ():
@@ -261,7 +262,7 @@ def test_states_of_a_full_run_differ():
 @pytest.mark.parametrize("inversion", ["nonlinear", "linear"])
 def test_a_sample_of_weight_two_counts_as_two(d, inversion, rng):
     X, matter = body(40, d)
-    stepper = model(Free(X, np.eye(d)), matter, inversion=inversion)
+    stepper = model(Free(X, np.eye(d)), matter, inversion=PositionInversion(inversion))
     some = np.arange(0, 40, 5)
     x = X[some] + 0.1 * rng.normal(size=(8, d))
     twice = np.concatenate([some[:1], some])

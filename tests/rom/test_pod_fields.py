@@ -7,6 +7,7 @@ from mpm_ref.rom.fields import pod_fields as module
 from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields, modes_of
 from mpm_ref.rom.fields.radial_basis import through
 from mpm_ref.rom.snapshots import Histories, join_histories
+from mpm_ref.rom.study.monitor import latent_modes
 from mpm_ref.rom.symmetric import tensor, values
 
 LEVELS, N, DT = 9, 60, 0.01
@@ -126,6 +127,7 @@ def test_modes_in_single_precision_tell_the_same_to_it(made, d):
     for b, own in enumerate(np.split(order, start[1:-1])):
         apart = np.abs(rounded.U[own] - rounded.U[middle[b]]).max(axis=(0, 1))
         assert np.array_equal(spread[b], apart)         # bounds hold of the modes as they are
+    assert latent_modes(rounded, ALL).dtype == float        # what a monitor sums
 
 
 @pytest.mark.parametrize("digits", ["double", "single"])

@@ -21,12 +21,14 @@ from scipy.spatial import KDTree
 
 from ...core.blas import one_thread
 from ...core.jit import CHUNKS, chunk, kernel, parallel, prange
+from ...core.prefetch import LINE, prefetch
 from ..symmetric import tensor
 from .blocks import group, points_of_blocks
 from .radial_basis import SMOOTHING, Radial, through
 
 LEAST = 1e-13           # square of a singular value over the largest: modes below are round-off
 COLUMNS = 20000         # of snapshots at a time
+AHEAD = 8192            # bytes of modes that are read ahead
 
 
 class ModalField(NamedTuple):
@@ -93,7 +95,9 @@ class PodFields(NamedTuple):
 
     def place(self, points, xhat):
         """Return x (m, d) [m] of points of these numbers."""
-        return self.X[points] + combined(self.U, points, self.all(xhat))
+        x = combined(self.U, points, self.all(xhat))
+        x += self.X.take(points, axis=0)
+        return x
 
     def derivatives(self, points, xhat):
         """Return x (m, d), None (there is no gradient between points), and dg/dxhat (m, d, r)."""
@@ -261,11 +265,17 @@ def _combine(modes, points, a, out):
 @kernel
 def combine(modes, points, a, out, bounds):
     """Compute the sums of points bounds[0] .. bounds[1] - 1, four terms at a time: a single running
-    sum would wait for each addition.
+    sum would wait for each addition. Modes of the points some places on are read ahead.
     """
     fours = len(a) - len(a) % 4
+    numbers = modes.shape[1] * modes.shape[2]
+    ahead = 1 + AHEAD // (numbers * modes.itemsize)
     for i in range(bounds[0], bounds[1]):
         p = points[i]
+        if i + ahead < len(points):
+            first = points[i + ahead] * numbers
+            for start in range(first, first + numbers, LINE // modes.itemsize):
+                prefetch(modes, start)
         for k in range(out.shape[1]):
             s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
             for r in range(0, fours, 4):

@@ -127,9 +127,13 @@ def nsf_reduced_run(study, full, fields, rest):
     `samples.chosen_samples` does.
     """
     table = study.tables.run
-    options = FieldRunOptions((chosen_samples(table, full.problem, fields),), table.dt_factor,
-                              table.inversion)
-    return nsf_run(full, fields, options, rest)
+    samples = chosen_samples(table, full.problem, fields)
+    return nsf_run(full, fields, field_run_options(table, samples), rest)
+
+
+def field_run_options(table, samples):
+    """Return the `FieldRunOptions` of the [run] table of a study, with a `SampleSet`."""
+    return FieldRunOptions((samples,), table.dt_factor, table.inversion, table.inversion_tolerance)
 
 
 def nsf_recording(study, full, fields, model, facts, count):
@@ -139,8 +143,7 @@ def nsf_recording(study, full, fields, model, facts, count):
                          f"at their own {len(full.X)} points; leave it out")
     table, problem = study.tables.run, full.problem
     samples = chosen_samples(table, problem, fields)
-    options = FieldRunOptions((samples,), table.dt_factor, table.inversion)
-    run = nsf_run(full, fields, options, model.rest)
+    run = nsf_run(full, fields, field_run_options(table, samples), model.rest)
     clock = replace(problem.clock, dt=run.dt, steps=run.steps, every=1)
     monitor = field_monitor(fields, model.xhat, (problem.clock.every or 1) / table.dt_factor)
     return Recording(run, monitor, FieldDisplay(full, fields),

@@ -284,7 +284,7 @@ def sample_warnings(fields, samples):
 
 def latent_modes(fields, points):
     """Return the modes of the latent coordinates (m, d, r) of `PodFields` at points by number."""
-    return fields.U[points][:, :, :fields.r]
+    return fields.U[points][:, :, :fields.r].astype(float, copy=False)
 
 
 def principal_axes(X):

@@ -20,7 +20,7 @@ from ..fields.polynomial_manifold import Curved, curved
 from ..latent import initial
 from ..model_file import Model
 from .errors import misfit
-from .tables import CURVED, KEYS, LDM, MODES, NETWORK, require_nonlinear
+from .tables import CURVED, KEYS, LDM, MODES, NETWORK, require_modes, require_nonlinear
 
 STORED_LOSSES = 50      # epochs of which the loss is stored in the file
 SIDE, STEP = 0.4, 1.0 / 144.0       # largest side [m] and time step [s] of the body that the loss's
@@ -198,16 +198,20 @@ def identity(study):
 
 
 def load(path, study):
-    """Return the `Model` of a file, of any kind. Raises ValueError for a file that is damaged or no
-    model, for one of another study, and for one that the study's projection does not suit.
+    """Return the `Model` of a file, of any kind; NSF's modes in the precision of the study's runs.
+    Raises ValueError for a file that is damaged or no model, for one of another study, and for one
+    that the study's projection or precision does not suit.
     """
     model = model_file.load(path)
     if model.about.get("study") != study.digest:
         raise ValueError(f"{path} is a map of another study, or of {study.path} before its scenes "
                          "or held-out runs changed; train again, or name the study it is of")
+    run = study.tables.run
     if study.tables.model == LDM:
-        require_nonlinear(model.about["map"]["kind"], study.tables.run.projection)
-    return model
+        require_nonlinear(kind_of(model), run.projection)
+        return model
+    require_modes(kind_of(model), run.precision)
+    return model._replace(field=model.field.single()) if run.precision == "single" else model
 
 
 def kind_of(model):

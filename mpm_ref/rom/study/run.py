@@ -12,6 +12,7 @@ from ...shapes.inside import solid
 from ..fields.blocks import body_blocks
 from ..kinematics import CLOSE
 from ..latent import Latent, initial, nearest
+from ..projection import PositionInversion
 from ..quadrature.eulerian import Eulerian
 from ..quadrature.lagrangian import CELLS, Lagrangian, Resampled, lagrangian
 from ..step import StepReport, ldm_stepper, nsf_stepper
@@ -198,6 +199,7 @@ class FieldRunOptions(NamedTuple):
     samples: tuple          # of `SampleSet`, in order of time (NSF-sec5.4)
     dt_factor: float = 1.0  # length of a step over that of the scene
     inversion: str = "nonlinear"
+    inversion_tolerance: float | None = None    # see `projection.PositionInversion`
 
 
 def nsf_run(full, fields, options, rest):
@@ -206,7 +208,7 @@ def nsf_run(full, fields, options, rest):
     """
     require_valid_sets(options.samples, len(full.X))
     clock = full.problem.clock
-    return ReducedRun(nsf_model(full, fields, options.inversion),
+    return ReducedRun(nsf_model(full, fields, options.inversion, options.inversion_tolerance),
                       lambda: nsf_start(full, fields, rest),
                       lambda xhat: nsf_sampler(options.samples), options.dt_factor * clock.dt,
                       step_count(clock, options.dt_factor))
@@ -217,11 +219,13 @@ def step_count(clock, dt_factor):
     return int(clock.steps / dt_factor * (1.0 + ROUNDING))
 
 
-def nsf_model(full, fields, inversion="nonlinear"):
-    """Return NSF's `ReducedStepper` of a `FullModel`."""
+def nsf_model(full, fields, inversion="nonlinear", tolerance=None):
+    """Return NSF's `ReducedStepper` of a `FullModel`. Raises ValueError as
+    `projection.PositionInversion` does.
+    """
     problem = full.problem
     return nsf_stepper(fields, full.material, problem.dx, problem.scheme.degree, problem.gravity,
-                       inversion, conditions=problem.conditions)
+                       PositionInversion(inversion, tolerance), conditions=problem.conditions)
 
 
 def nsf_start(full, fields, rest):

@@ -9,7 +9,7 @@ from ...shapes.quantities import Count, Natural, NotNegative, PerCell, Positive,
 from ..fields.architecture import HIDDEN
 from ..fields.pod_fields import Sizes
 from ..latent import VELOCITIES
-from ..projection import INVERSIONS
+from ..projection import INVERSIONS, require_tolerance
 from .run import PRECISIONS, PROJECTIONS, QUADRATURES, RunOptions
 
 LDM, NSF = "ldm", "nsf"             # methods
@@ -51,6 +51,13 @@ def require_nonlinear(kind, projection):
     if kind == CURVED and projection != "nonlinear":
         raise ValueError(f"run.projection = {projection!r}: expected 'nonlinear' for a curved map, "
                          "since linear projection leaves the curve in every step")
+
+
+def require_modes(kind, precision):
+    """Raise ValueError for NSF's fields of a kind that has no single precision."""
+    if precision == "single" and kind != MODES:
+        raise ValueError(f"run.precision = 'single': expected 'double' for fields of kind "
+                         f"{kind!r}; only modes are stored in single precision")
 
 
 NAMES = {"reduced_model": "map", "overrides": "set"}       # of keys in a file
@@ -252,9 +259,14 @@ class FieldsRunTable(StudyTable):
     cells: Count | None = None                  # of all samples, which then have weights, at most
     dt_factor: StepFactor = 1.0                 # length of a step over that of the scene
     inversion: str = INVERSIONS[0]
+    inversion_tolerance: Positive | None = None     # see `projection.PositionInversion`
+    precision: str = PRECISIONS[0]              # of modes
 
     def __post_init__(self):
         one_of("inversion", self.inversion, INVERSIONS)
+        one_of("precision", self.precision, PRECISIONS)
+        if self.inversion_tolerance is not None:
+            require_tolerance(self.inversion_tolerance, self.inversion)
         if self.cells is not None and (self.weighted or self.points is not None):
             raise ValueError(f"cells = {self.cells}: samples are points of this many cells and "
                              "have weights; expected neither `points` nor `weighted` beside it")
@@ -268,6 +280,10 @@ class FieldsTables(CommonTables, kw_only=True, rename=NAMES):
 
     reduced_model: FieldsTable
     run: FieldsRunTable = FieldsRunTable()
+
+    def __post_init__(self):
+        require_modes(self.reduced_model.kind, self.run.precision)
+        super().__post_init__()
 
 
 TABLES = {LDM: (MapTables, MapTable, MapRunTable),         # of each method: all, [map], [run]
