@@ -27,6 +27,8 @@ class FullModel(NamedTuple):
     boundary_points: tuple = ()     # of LDM: index arrays of the points within a cell, at the
                                     # start, of each prescribed region ...
     inner_points: tuple = ()        # ... and of those inside it at the start; none if it is fixed
+    by_number: bool = False         # of LDM: whether its map takes numbers of points, also of a
+                                    # single body
 
     @property
     def rho(self):
@@ -41,9 +43,10 @@ class FullModel(NamedTuple):
     @property
     def map_points(self):
         """Names of all points as a map of LDM takes them: places at rest (n, d) [m] of a single
-        body, numbers (n,) of several.
+        body, numbers (n,) of several, or where the map takes numbers.
         """
-        return self.X if len(self.bodies) == 1 else np.arange(len(self.X))
+        by_place = len(self.bodies) == 1 and not self.by_number
+        return self.X if by_place else np.arange(len(self.X))
 
     @property
     def body_points(self):

@@ -20,7 +20,7 @@ from .reduce import (
     fields_misfit,
     fields_of_run,
     map_misfit,
-    require_modes,
+    require_one_body,
     train_fields,
     train_map,
 )
@@ -62,7 +62,7 @@ def every_step(base, changes):
 
 def require_ldm_options(study, full):
     """Raise ValueError for a map, or a quadrature, that a `FullModel` of several bodies has not."""
-    require_modes(study)
+    require_one_body(study)
     require_own_points(full, study.tables.run.options)
 
 

@@ -77,7 +77,7 @@ def compute_map(study, snapshots):
     return g, xhat, np.zeros(settings.r)
 
 
-def require_modes(study):
+def require_one_body(study):
     """Raise ValueError for a map of several bodies that is a network."""
     bodies = len(study.base.body)
     if bodies > 1 and study.tables.reduced_model.kind == NETWORK:
@@ -86,10 +86,10 @@ def require_modes(study):
 
 
 def train_map(study, snapshots, about, checkpoint, on_epoch, machine):
-    """Return the `Model` of a decoder trained on `Snapshots`. Raises ValueError as `require_modes`
-    does.
+    """Return the `Model` of a decoder trained on `Snapshots`. Raises ValueError as
+    `require_one_body` does.
     """
-    require_modes(study)
+    require_one_body(study)
     settings = {name: getattr(study.tables.reduced_model, name) for name in ("r", *KEYS[NETWORK])}
     settings["weights"] = trainer().loss_weights(settings["weights"], *size_ratios(study.base))
     trained = trainer().fit_decoder(settings, snapshots, checkpoint, on_epoch, machine)

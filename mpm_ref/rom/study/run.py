@@ -10,6 +10,9 @@ import numpy as np
 from ...sampling import Regular, sample
 from ...shapes.inside import solid
 from ..fields.blocks import body_blocks
+from ..fields.numbered import numbered
+from ..fields.pod import PodModes
+from ..fields.polynomial_manifold import Curved
 from ..kinematics import CLOSE
 from ..latent import Latent, initial, nearest
 from ..projection import PositionInversion
@@ -104,8 +107,20 @@ def ldm_run(full, g, options, rest, seed=0):
     at rest. Raises ValueError as `ldm_model` does; its states, as `samples.ldm_sampler` does.
     """
     clock = full.problem.clock
+    full, g = with_numbers(full, g, options)
     return ReducedRun(ldm_model(full, g, options), lambda: ldm_start(full, g, rest),
                       lambda xhat: ldm_sampler(full, g, options, xhat, seed), clock.dt, clock.steps)
+
+
+def with_numbers(full, g, options):
+    """Return a `FullModel` and a map by the numbers of points, where a run evaluates modes at the
+    points of their data alone: the same values, without a search for each point.
+    """
+    modes = g.modes if isinstance(g, Curved) else g
+    if (isinstance(modes, PodModes) and options.quadrature == QUADRATURES[0]
+            and np.array_equal(modes.X, full.X)):
+        return full._replace(by_number=True), numbered(g)
+    return full, g
 
 
 def ldm_model(full, g, options):
@@ -159,7 +174,7 @@ def with_precision(g, options, transfer):
 def material_quadrature(full, options):
     """Return the quadrature with the material points of a `FullModel`."""
     dx, degree = full.problem.dx, full.problem.scheme.degree
-    if len(full.bodies) == 1:
+    if full.map_points is full.X:
         return lagrangian(full.X, full.m, full.V0, dx, degree)
     sizes = [len(body.id) for body in full.bodies]
     return Lagrangian(full.map_points, full.m, full.V0, body_blocks(full.X, sizes, CELLS * dx), dx,
