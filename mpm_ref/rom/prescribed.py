@@ -1,4 +1,4 @@
-"""How much of a point's velocity after a step is prescribed, and the weight that follows from it.
+"""Shares of points' velocities that are prescribed, and the weights that follow from them.
 
 A velocity gathered from the grid is sum_i w_ip v_i over the nodes i of a point p. Its share
 
