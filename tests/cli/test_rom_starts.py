@@ -13,9 +13,9 @@ THROWN = (SCENE.replace('transfer = "pic"', 'transfer = "mls"')
 KICKS = (("gravity[1]", "body.bar.velocity.linear[1]"), ('name = "g"', 'name = "kick"'))
 
 
-def make(folder, scene):
+def make(folder, scene, *changes):
     """Make a study of velocities at the start, its runs and its map in a folder; return it."""
-    study = write(folder, *KICKS, scene=scene)
+    study = write(folder, *KICKS, *changes, scene=scene)
     for command in (("generate", study, "--out", folder / "data", "--workers", 1),
                     ("train", study, "--data", folder / "data", "--out", folder / "map.npz")):
         done = mpm_ref("rom", *command)
@@ -58,10 +58,10 @@ def test_weights_of_driven_samples_are_an_option_of_a_study(made, tmp_path):
                 "driven_weight")
 
 
-def test_a_weight_where_nothing_is_driven_is_refused_in_a_sentence(tmp_path):
-    folder = make(tmp_path, THROWN.replace("point = [0.1, 0.0]", "point = [0.0, 0.0]"))
+def test_a_weight_where_nothing_is_prescribed_is_refused_in_a_sentence(tmp_path):
+    folder = make(tmp_path, THROWN[:THROWN.index("[[fixed]]")], ("r = 3", "r = 1"))
     text = (folder / "bars.toml").read_text()
     (folder / "free.toml").write_text(
         text.replace("[map]", "[run]\ndriven_weight = 4.0\n\n[map]"))
     assert_told(run(folder, tmp_path / "run.h5", "--set", "kick=1", study="free.toml"), 2,
-                "driven_weight = 4: expected 1, since no point is inside a region")
+                "driven_weight = 4: expected 1, since the scene prescribes no velocity")

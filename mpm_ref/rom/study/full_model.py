@@ -25,8 +25,7 @@ class FullModel(NamedTuple):
     v: np.ndarray           # (n, d) velocity at the start [m/s]
     shape: object = None    # of LDM's single body at rest, as the scene has it
     boundary_points: tuple = ()     # of LDM: index arrays of the points within a cell, at the
-                                    # start, of each prescribed region ...
-    inner_points: tuple = ()        # ... and of those inside it at the start; none if it is fixed
+                                    # start, of each prescribed region
     by_number: bool = False         # of LDM: whether its map takes numbers of points, also of a
                                     # single body
 
@@ -69,19 +68,8 @@ class FullModel(NamedTuple):
         """Return those of `boundary_points` whose region acts in the step from time t [s] on;
         samples must not miss them (LDM-sec3.3-hyper).
         """
-        return self._acting(self.boundary_points, t)
-
-    def driven_points(self, t):
-        """Return the sorted numbers of the points that were at the start inside a region with a
-        motion which acts in the step from time t [s] on.
-        """
-        return np.unique(np.concatenate([np.empty(0, dtype=int),
-                                         *self._acting(self.inner_points, t)]))
-
-    def _acting(self, points, t):
-        """Return those of groups, one of each prescribed region, whose region acts from t [s]."""
         middle = t + 0.5 * self.problem.clock.dt
-        regions = zip(points, prescribed_regions(self.problem), strict=True)
+        regions = zip(self.boundary_points, prescribed_regions(self.problem), strict=True)
         return tuple(group for group, region in regions if region.since < middle < region.until)
 
 
@@ -111,10 +99,8 @@ def ldm_full_model(scene):
     X, m, V0, v = points_of(problem.bodies)
     regions = prescribed_regions(problem)
     boundary = tuple(np.flatnonzero(distances(X, one.shape) <= problem.dx) for one in regions)
-    inner = tuple(np.flatnonzero((distances(X, one.shape) <= 0.0) & one.motion.moves)
-                  for one in regions)
     shape = scene.body[0].shape if len(bodies) == 1 else None
-    return FullModel(problem, X, m, V0, v, shape, boundary, inner)
+    return FullModel(problem, X, m, V0, v, shape, boundary)
 
 
 def nsf_full_model(scene):

@@ -25,7 +25,7 @@ from .samples import (
     SampleSet,
     ldm_sampler,
     nsf_sampler,
-    require_driven_points,
+    require_prescribed_region,
     require_valid_sets,
 )
 
@@ -93,8 +93,8 @@ class RunOptions(NamedTuple):
     samples: str = "redrawn"
     preimage_tolerance: float = CLOSE       # distance of Eulerian points from their places [dx]
     precision: str = "double"   # of a learned map, or "single"
-    driven_weight: float = 1.0  # ours: of the samples that moving regions drive
-                                # (`FullModel.driven_points`), over the others', in the projection
+    driven_weight: float = 1.0  # ours: in the projection, of a sample whose velocity is prescribed
+                                # over that of one whose is free (see `rom.prescribed`)
 
     @property
     def name(self):
@@ -125,11 +125,11 @@ def with_numbers(full, g, options):
 
 def ldm_model(full, g, options):
     """Return LDM's `ReducedStepper` of a `FullModel` on a map g. Raises ValueError for a quadrature
-    that does not exist, and as `require_own_points`, `require_driven_points` and
-    `with_precision` do.
+    that does not exist, and as `require_own_points`, `require_prescribed_region`
+    and `with_precision` do.
     """
     require_own_points(full, options)
-    require_driven_points(full, options)
+    require_prescribed_region(full, options)
     problem = full.problem
     make = {"lagrangian": material_quadrature, "eulerian": cell_quadrature,
             "resampled": resampled_quadrature}

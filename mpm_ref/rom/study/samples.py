@@ -11,8 +11,10 @@ import numpy as np
 
 from ..cubature import CANDIDATES, cubature
 from ..fields.pod_fields import PodFields
+from ..prescribed import prescribed_share, weights_by_share
 from ..quadrature.stencil_overlap import bases
 from ..sampling import PER_GROUP, draw, pivoted
+from .full_model import prescribed_regions
 
 ENOUGH = 4000       # points from which the start is searched, and among which samples are pivoted
 MAX_CELLS = 400     # cells of this many random points are candidates
@@ -36,11 +38,11 @@ def ldm_sampler(full, g, options, xhat, seed):
     """
     rng = np.random.default_rng(seed)
 
-    def weighted(since, points, t):
-        return SampleSet(since, points, driven_weights(full, options, points, t))
+    def weighted(since, points, when):
+        return SampleSet(since, points, driven_weights(full, g, options, points, when))
 
     if options.samples == "redrawn":
-        return lambda t, latent: weighted(t, random_draw(full, g, options, t)(rng), t)
+        return lambda t, latent: weighted(t, random_draw(full, g, options, t)(rng), (t, latent))
     if options.samples == "kept":
         points = random_draw(full, g, options)(rng)
     elif options.samples == "pivoted":
@@ -48,24 +50,26 @@ def ldm_sampler(full, g, options, xhat, seed):
                                  lambda X: g.derivatives(X, xhat)[2], rng)
     else:
         raise ValueError(f"samples = {options.samples!r}: expected redrawn, kept or pivoted")
-    return lambda t, latent: weighted(0.0, points, t)
+    return lambda t, latent: weighted(0.0, points, (t, latent))
 
 
-def require_driven_points(full, options):
-    """Raise ValueError for a `driven_weight` of a `FullModel` none of whose points is driven."""
-    if options.driven_weight != 1.0 and not any(map(len, full.inner_points)):
-        raise ValueError(f"driven_weight = {options.driven_weight:g}: expected 1, since no point "
-                         "is inside a region that moves")
+def require_prescribed_region(full, options):
+    """Raise ValueError for a `driven_weight` of a `FullModel` without prescribed regions."""
+    if options.driven_weight != 1.0 and not prescribed_regions(full.problem):
+        raise ValueError(f"driven_weight = {options.driven_weight:g}: expected 1, since the scene "
+                         "prescribes no velocity; add a [[fixed]] region, or leave it out")
 
 
-def driven_weights(full, options, points, t):
-    """Return the weights (m,) of samples in the step that begins at t [s]: `driven_weight` of
-    those that are driven, 1 of others; None where all count the same.
+def driven_weights(full, g, options, points, when):
+    """Return the weights (m,) of samples by the share of their velocity that is prescribed (see
+    `rom.prescribed`), in the step that begins when = (time [s], `Latent`); None where all count the
+    same.
     """
-    driven = np.isin(points, full.driven_points(t)) if options.driven_weight != 1.0 else None
-    if driven is None or not driven.any():
+    if options.driven_weight == 1.0:
         return None
-    return np.where(driven, options.driven_weight, 1.0)
+    t, latent = when
+    phi = prescribed_share(full.problem, g.place(full.map_points[points], latent.xhat), t)
+    return weights_by_share(phi, options.driven_weight) if phi.any() else None
 
 
 def random_draw(full, g, options, t=0.0):

@@ -1,4 +1,4 @@
-"""The weight of driven samples is chosen on training runs, and judged on test runs."""
+"""The weight of prescribed samples is chosen on training runs, and judged on test runs."""
 
 from types import SimpleNamespace
 
@@ -8,17 +8,19 @@ from mpm_ref.rom.study.errors import PositionErrors
 from validation.ldm import driven_weights as experiment
 from validation.ldm.studies import POKES
 
-ERRORS = {("training", 1.0): 5.0, ("training", 4.0): 3.0, ("training", 9.0): 2.0,
-          ("training", 25.0): 4.0, ("training", 64.0): 4.5, ("test", 1.0): 8.0, ("test", 9.0): 6.0}
+TRAINING = dict(zip(experiment.WEIGHTS, (5.0, 3.0, 2.0, 4.0, 4.5, 4.7), strict=True))
+BEST = 16.0
+TEST = {1.0: 8.0, BEST: 6.0}
 
 
 def test_the_best_weight_of_training_runs_is_tested(monkeypatch):
     found, nothing = {}, SimpleNamespace(X=np.zeros((7, 3)), scale="runs", total=9)
-    monkeypatch.setattr(experiment, "maps", lambda: {"network": None})
-    monkeypatch.setattr(experiment, "training_references", lambda count: nothing)
+    one = experiment.Weighted("network", POKES, None, np.zeros(6), 4)
+    monkeypatch.setattr(experiment, "maps", lambda: (one,))
+    monkeypatch.setattr(experiment, "training_references", lambda study, count: nothing)
     monkeypatch.setattr(experiment, "references", lambda study, count: nothing)
     monkeypatch.setattr(experiment, "errors_of", lambda run, about, runs, options: PositionErrors(
-        *3 * [ERRORS[about[1], options.driven_weight]]))
+        *3 * [{"training": TRAINING, "test": TEST}[about[1]][options.driven_weight]]))
     tables = {}
     run = SimpleNamespace(progress=lambda names, noun: names,
                           record=lambda name, value, **rest: found.update({name: value}),
@@ -27,12 +29,12 @@ def test_the_best_weight_of_training_runs_is_tested(monkeypatch):
     assert found["ldm.driven-weight.network.all.gain"] == 0.75
     assert found["ldm.driven-weight.network.50"] == 600.0
     assert [row[1:4] for row in tables["errors"]] == [
-        *((w, 7, "training") for w in (1.0, 4.0, 9.0, 25.0, 64.0)),
-        *((w, n, "test") for n in (50, 7) for w in (1.0, 9.0))]
+        *((w, 7, "training") for w in experiment.WEIGHTS),
+        *((w, n, "test") for n in (50, 7) for w in (1.0, BEST))]
 
 
 def test_training_runs_are_those_of_the_study():
-    found = experiment.training_references(2)
+    found = experiment.training_references(POKES, 2)
     runs = POKES.train[0], POKES.train[len(POKES.train) // 2]
     assert [one.problem.title for one in found.cases] == 2 * ["LDM: poke and recover"]
     np.testing.assert_array_equal(found.x, POKES.run(runs).x)
