@@ -190,3 +190,11 @@ def test_several_parameters_are_interpolated_within_a_simplex(rng):
     assert min(weights.values()) > 0.0
     assert interpolation_weights(mu, np.array([2.0, 0.0, 2.0])) == {}
     assert interpolation_weights(mu, np.array([*target[:2], 3.0])) == {}
+
+
+def test_runs_that_span_no_simplex_are_not_interpolated(rng):
+    """Fewer runs than a simplex has corners, and runs whose parameters lie on a line."""
+    mu = rng.uniform(size=(4, 6))
+    assert interpolation_weights(mu, mu.mean(axis=0)) == {}
+    line = np.linspace(0.0, 1.0, 5)[:, None] * np.array([1.0, 2.0])
+    assert interpolation_weights(line, line.mean(axis=0)) == {}

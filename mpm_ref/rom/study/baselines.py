@@ -69,7 +69,8 @@ def nearest_parameters(study, number):
 
 def interpolation_weights(mu, target):
     """Return {row: weight} of the linear interpolation in parameters mu (runs, parameters) at a
-    target (parameters,); empty where it lies outside their convex hull.
+    target (parameters,); empty where it lies outside their convex hull, as it does where the runs
+    are fewer than a simplex has corners.
 
     One parameter is interpolated between its two neighbours, several within the simplex of a
     Delaunay triangulation, each parameter measured in its range.
@@ -97,7 +98,11 @@ def _between(points, point):
 
 
 def _barycentric(points, point):
-    """Return the corners of the simplex around a point, and its barycentric coordinates."""
+    """Return the corners of the simplex around a point, and its barycentric coordinates; none where
+    the points span no simplex.
+    """
+    if np.linalg.matrix_rank(points - points[0]) < points.shape[1]:
+        return (), ()
     mesh = Delaunay(points)
     simplex = int(mesh.find_simplex(point))
     if simplex < 0:
