@@ -53,7 +53,7 @@ def require_nonlinear(kind, projection):
                          "since linear projection leaves the curve in every step")
 
 
-def require_modes(kind, precision):
+def require_precision(kind, precision):
     """Raise ValueError for NSF's fields of a kind that has no single precision."""
     if precision == "single" and kind != MODES:
         raise ValueError(f"run.precision = 'single': expected 'double' for fields of kind "
@@ -282,7 +282,7 @@ class FieldsTables(CommonTables, kw_only=True, rename=NAMES):
     run: FieldsRunTable = FieldsRunTable()
 
     def __post_init__(self):
-        require_modes(self.reduced_model.kind, self.run.precision)
+        require_precision(self.reduced_model.kind, self.run.precision)
         super().__post_init__()
 
 
