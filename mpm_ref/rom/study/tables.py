@@ -10,6 +10,7 @@ from ..fields.architecture import HIDDEN
 from ..fields.pod_fields import Sizes
 from ..latent import VELOCITIES
 from ..projection import INVERSIONS, require_tolerance
+from ..quadrature.eulerian import BOUNDARY_CELLS
 from .run import PRECISIONS, PROJECTIONS, QUADRATURES, RunOptions
 
 LDM, NSF = "ldm", "nsf"             # methods
@@ -157,6 +158,7 @@ class MapRunTable(StudyTable):
                                                 # from their places [dx]
     precision: str = RunOptions().precision            # of a network
     driven_weight: Positive = RunOptions().driven_weight    # of samples that are driven
+    boundary_cells: str = RunOptions().boundary_cells  # of Eulerian points
     velocity: str = RunOptions().velocity
     seed: Seed = 0                              # of the samples
 
@@ -166,6 +168,7 @@ class MapRunTable(StudyTable):
         one_of("projection", self.projection, PROJECTIONS)
         one_of("velocity", self.velocity, VELOCITIES)
         one_of("precision", self.precision, PRECISIONS)
+        one_of("boundary_cells", self.boundary_cells, BOUNDARY_CELLS)
 
     @property
     def options(self):
