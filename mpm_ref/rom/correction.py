@@ -40,7 +40,7 @@ class Carrier(NamedTuple):
         return self.X + np.einsum("nk,nka->na", self.w, u[self.near])
 
 
-class Correction(NamedTuple):
+class CoarseCorrection(NamedTuple):
     """A `Carrier` with a learned correction of R modes, from S training states."""
 
     carrier: Carrier
@@ -70,16 +70,16 @@ def carrier(X, X_coarse):
 
 
 def fit_correction(one, x, x_coarse, R, smoothing):
-    """Return the `Correction` of R modes from training states: x (S, n, d) of the fine points of a
-    `Carrier` and x_coarse (S, m, d) of its particles [m]. smoothing: lam over the mean square of
-    the displacements. Raises ValueError for more modes than the states hold.
+    """Return the `CoarseCorrection` of R modes from training states: x (S, n, d) of the fine points
+    of a `Carrier` and x_coarse (S, m, d) of its particles [m]. smoothing: lam over the mean square
+    of the displacements. Raises ValueError for more modes than the states hold.
     """
     require_pairs(one, x, x_coarse, smoothing)
     states = (x_coarse - one.X_coarse).reshape(len(x_coarse), -1)
     missing = np.array([fine - one.place(coarse) for fine, coarse in
                         zip(x, x_coarse, strict=True)])
     modes, A = directions(np.zeros_like(one.X), missing, R)
-    return Correction(one, modes, states, ridge_weights(states, A, smoothing))
+    return CoarseCorrection(one, modes, states, ridge_weights(states, A, smoothing))
 
 
 def ridge_weights(states, A, smoothing):

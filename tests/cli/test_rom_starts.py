@@ -58,6 +58,17 @@ def test_weights_of_driven_samples_are_an_option_of_a_study(made, tmp_path):
                 "driven_weight")
 
 
+def test_boundary_cells_without_cells_are_refused_in_a_sentence(made, tmp_path):
+    text = (made / "bars.toml").read_text()
+    for quadrature, word in (("eulerian", "cut.toml"), ("lagrangian", "points.toml")):
+        (made / word).write_text(text.replace(
+            "[map]", f'[run]\nquadrature = "{quadrature}"\nboundary_cells = "cut"\n\n[map]'))
+    done = run(made, tmp_path / "run.h5", "--set", "kick=1", study="cut.toml")
+    assert done.exit_code == 0, done.output
+    assert_told(run(made, tmp_path / "none.h5", "--set", "kick=1", study="points.toml"), 2,
+                "boundary_cells = 'cut' with quadrature = 'lagrangian': expected 'whole'")
+
+
 def test_a_weight_where_nothing_is_prescribed_is_refused_in_a_sentence(tmp_path):
     folder = make(tmp_path, THROWN[:THROWN.index("[[fixed]]")], ("r = 3", "r = 1"))
     text = (folder / "bars.toml").read_text()

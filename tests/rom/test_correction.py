@@ -60,7 +60,7 @@ def test_weights_are_those_of_ridge_regression():
     assert np.allclose(states.T @ ridge_weights(states, A, smoothing), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("noise, smoothest", [(0.0, False), (3.0, True)])
+@pytest.mark.parametrize(("noise", "smoothest"), [(0.0, False), (3.0, True)])
 def test_noisy_answers_are_smoothed(noise, smoothest):
     rng = np.random.default_rng(5)
     states, runs = rng.normal(size=(24, 40)) / 40**0.5, np.arange(24) // 4

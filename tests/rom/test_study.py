@@ -150,6 +150,8 @@ def test_what_is_set_is_set_in_all_runs(tmp_path):
     ('"modes"', '"curved"\nmodes = 5', "run.projection = 'linear': expected 'nonlinear' for a "
      "curved map"),
     ("[map]", '[run]\nprecision = "half"\n[map]', "run.precision = 'half': expected one of"),
+    ("[map]", '[run]\nboundary_cells = "a"\n[map]', "run.boundary_cells = 'a': expected one of "
+     "'whole', 'cut'"),
     ("[map]", '[run]\npreimage_tolerance = 0\n[map]', "run.preimage_tolerance = 0"),
     ('"modes"', '"network"\nlatent = "a"', "map.latent = 'a': expected one of"),
     ('"modes"', '"network"\nweights = "a"', "map.weights = 'a': expected one of"),

@@ -1,5 +1,5 @@
-"""Ways to the positions of a run of the arm: full-order runs on grids of their own, what is looked
-up in the training runs, reduced models, and a coarse run with a learned correction.
+"""Methods for the positions of a run of the arm: full-order runs on grids of their own, what is
+looked up in the training runs, reduced models, and a coarse run with a learned correction.
 """
 
 from collections.abc import Callable
@@ -30,18 +30,18 @@ CURVED = 4              # free coordinates of a curved map
 NSF = Sizes(r=8, smoothing=1e-4)
 
 
-class Answer(NamedTuple):
+class TimedPositions(NamedTuple):
     """Positions of a run, and the CPU time that they took."""
 
     x: np.ndarray | None    # (LEVELS + 1, n, 3) [m]; None: it broke down, or there is none
     cpu: float              # [s]
 
 
-class Way(NamedTuple):
-    """A way to the positions of a run of parameters mu (6,)."""
+class ArmMethod(NamedTuple):
+    """A method for the positions of a run of parameters mu (6,)."""
 
     name: str
-    answer: Callable        # mu -> `Answer`
+    positions: Callable        # mu -> `TimedPositions`
     fit: float = 0.0        # CPU seconds of what it computes from the training runs
     pairs: int = 0          # it needs training runs on a grid so many times as coarse too
     settings: str = ""      # in words
@@ -67,20 +67,20 @@ class Training(NamedTuple):
 
 # Full-order runs.
 
-def full_way(dx, transfer="apic"):
-    """Return the `Way` of a full-order run with a transfer."""
-    def answer(mu):
+def full_method(dx, transfer="apic"):
+    """Return the `ArmMethod` of a full-order run with a transfer."""
+    def positions(mu):
         run = simulated(arm(mu, dx, transfer))
-        return Answer(run.x, run.cpu)
-    return Way(f"full.{transfer}", answer)
+        return TimedPositions(run.x, run.cpu)
+    return ArmMethod(f"full.{transfer}", positions)
 
 
-def coarse_way(times, training):
-    """Return the `Way` of a full-order run on a grid `times` as coarse, with steps as much longer,
-    whose particles carry the fine points at the end.
+def coarse_method(times, training):
+    """Return the `ArmMethod` of a full-order run on a grid `times` as coarse, with steps as much
+    longer, whose particles carry the fine points at the end.
     """
     one = carrier_of(times, training)
-    return Way(f"coarse.{times}", partial(carried, times, training.dx, one.place))
+    return ArmMethod(f"coarse.{times}", partial(carried, times, training.dx, one.place))
 
 
 def carrier_of(times, training):
@@ -89,23 +89,25 @@ def carrier_of(times, training):
 
 
 def carried(times, dx, place, mu):
-    """Return the `Answer` of a coarse run; place: positions of its particles -> of fine points."""
+    """Return the `TimedPositions` of a coarse run; place: positions of its particles -> of fine
+    points.
+    """
     run = simulated(arm(mu, times * dx))
     start = process_time()
     x = np.array([place(state.astype(float)) for state in run.x])
-    return Answer(x, run.cpu + process_time() - start)
+    return TimedPositions(x, run.cpu + process_time() - start)
 
 
-def corrected_way(times, training, coarse):
-    """Return the `Way` of a coarse run with a correction learned from the training runs and those
-    of the same parameters on the coarse grid, `ArmRun`s.
+def corrected_method(times, training, coarse):
+    """Return the `ArmMethod` of a coarse run with a correction learned from the training runs and
+    those of the same parameters on the coarse grid, `ArmRun`s.
     """
     start, one = process_time(), carrier_of(times, training)
     x, x_coarse = (np.concatenate([run.x[1:] for run in runs]).astype(float)
                    for runs in (training.runs, coarse))
     smoothing = smoothing_of(one, x, x_coarse)
     fit = fit_correction(one, x, x_coarse, CORRECTIONS, smoothing)
-    return Way(f"corrected.{times}", partial(carried, times, training.dx, fit.place),
+    return ArmMethod(f"corrected.{times}", partial(carried, times, training.dx, fit.place),
                process_time() - start, times, f"smoothing {smoothing:g}, chosen by leaving out "
                "each training run")
 
@@ -120,9 +122,9 @@ def smoothing_of(one, x, x_coarse):
 
 # Training runs, looked up.
 
-def looked_up_ways(training):
-    """Yield the `Way`s that weigh training runs: the nearest, interpolation between them, and the
-    linear function of the parameters that fits them best.
+def looked_up_methods(training):
+    """Yield the `ArmMethod`s that weigh training runs: the nearest, interpolation between them, and
+    the linear function of the parameters that fits them best.
     """
     low, high = np.transpose(ENDS)
     unit = (training.mu - low) / (high - low)
@@ -137,22 +139,24 @@ def looked_up_ways(training):
     weighing = {"nearest": nearest, "linear": linear,
                 "interpolated": partial(interpolation_weights, unit)}
     for name, weights in weighing.items():
-        yield Way(name, partial(weighted, training, weights, (low, high)))
+        yield ArmMethod(name, partial(weighted, training, weights, (low, high)))
 
 
 def weighted(training, weights, ends, mu):
-    """Return the `Answer` of training runs with the weights of a target in units of its range."""
+    """Return the `TimedPositions` of training runs with the weights of a target in units of its
+    range.
+    """
     low, high = ends
     start = process_time()
     chosen = weights((mu - low) / (high - low))
     x = sum(w * training.runs[k].x.astype(float) for k, w in chosen.items()) if chosen else None
-    return Answer(x, process_time() - start)
+    return TimedPositions(x, process_time() - start)
 
 
 # Reduced models.
 
 def stepped(plan, place):
-    """Return the `Answer` of a `ReducedRun`; place: latent coordinates -> x (n, 3)."""
+    """Return the `TimedPositions` of a `ReducedRun`; place: latent coordinates -> x (n, 3)."""
     start, x = process_time(), []
     every = plan.steps // LEVELS
     try:
@@ -161,40 +165,40 @@ def stepped(plan, place):
                 if k % every == 0:
                     x.append(place(state.latent.xhat))
     except BREAKDOWNS:
-        return Answer(None, process_time() - start)
-    return Answer(np.array(x), process_time() - start)
+        return TimedPositions(None, process_time() - start)
+    return TimedPositions(np.array(x), process_time() - start)
 
 
-def map_way(name, training, g, options, fit):
-    """Return the `Way` of LDM's reduced run on a map g; fit: CPU seconds that it took."""
+def map_method(name, training, g, options, fit):
+    """Return the `ArmMethod` of LDM's reduced run on a map g; fit: CPU seconds that it took."""
     X = training.X
 
-    def answer(mu):
+    def positions(mu):
         full = ldm_full_model(arm(mu, training.dx))
         return stepped(ldm_run(full, g, options, np.zeros(g.r)), partial(g.place, X))
     points = options.points or "all"
-    return Way(name, answer, fit, settings=f"r = {g.r}, {points} samples")
+    return ArmMethod(name, positions, fit, settings=f"r = {g.r}, {points} samples")
 
 
-def pod_ways(training, bent):
-    """Yield the `Way`s of LDM on POD modes, with all samples and a few, and if it is to be `bent`
-    on a curved map of as many.
+def pod_methods(training, bent):
+    """Yield the `ArmMethod`s of LDM on POD modes, with all samples and a few, and if it is to be
+    `bent` on a curved map of as many.
     """
     start = process_time()
     x, F = (np.concatenate([run.fields[name] for run in training.runs]).astype(float)
             for name in ("x", "F"))
     found = basis(training.X, x, F, MODES)
     fit = process_time() - start
-    yield map_way("pod.all", training, found.modes, RunOptions(), fit)
-    yield map_way("pod.few", training, found.modes, RunOptions(points=FEW), fit)
+    yield map_method("pod.all", training, found.modes, RunOptions(), fit)
+    yield map_method("pod.few", training, found.modes, RunOptions(points=FEW), fit)
     if bent:
-        yield map_way("curved", training, curved(found, CURVED, 2),
+        yield map_method("curved", training, curved(found, CURVED, 2),
                       RunOptions(projection="nonlinear"), fit)
 
 
-def nsf_ways(training):
-    """Yield the `Way`s of NSF's reduced run on fields of modes, with all samples and with a few
-    that have weights.
+def nsf_methods(training):
+    """Yield the `ArmMethod`s of NSF's reduced run on fields of modes, with all samples and with a
+    few that have weights.
     """
     start = process_time()
     scene = arm(training.mu[0], training.dx)
@@ -205,13 +209,13 @@ def nsf_ways(training):
                           ("few", partial(weighted_samples, fields, n, FEW, 0))):
         start = process_time()
         sets = (samples(),)
-        yield Way(f"nsf.{name}", partial(field_answer, training.dx, fields, sets, rest),
+        yield ArmMethod(f"nsf.{name}", partial(field_positions, training.dx, fields, sets, rest),
                   fit + process_time() - start,
                   settings=f"r = {NSF.r}, {len(sets[0].points)} samples")
 
 
-def field_answer(dx, fields, sets, rest, mu):
-    """Return the `Answer` of a reduced run of NSF on fields with sample sets."""
+def field_positions(dx, fields, sets, rest, mu):
+    """Return the `TimedPositions` of a reduced run of NSF on fields with sample sets."""
     own, points = fields.with_parameters(mu), np.arange(len(fields.X))
     plan = nsf_run(nsf_full_model(arm(mu, dx)), own, FieldRunOptions(sets), rest)
     return stepped(plan, partial(own.place, points))

@@ -9,10 +9,14 @@ import numpy as np
 
 from ..kinematics import CLOSE, evaluate, guesses, guesses_by_cell, preimages
 from . import Cloud
+from .cut_cells import parts_inside
 from .stencil_overlap import stencil_overlap
 
 PER_CELL = 2        # quadrature points of a cell per axis, l
 FAR = 1.0           # distance of a first guess from the body at which its point is not in it [dx]
+WHOLE, CUT = "whole", "cut"
+BOUNDARY_CELLS = (WHOLE, CUT)   # what a sub-cell counts by that the body's surface cuts: as a whole
+                                # or not at all by its midpoint, or the part of it in the body
 
 
 class Eulerian(NamedTuple):
@@ -28,6 +32,7 @@ class Eulerian(NamedTuple):
     degree: int         # of its splines
     per_cell: int = PER_CELL
     close: float = CLOSE    # how near a point's image must be to its place [dx]
+    boundary_cells: str = WHOLE     # one of `BOUNDARY_CELLS`
 
     feather = 1e-9      # mass of a sample on the grid over that of a point: no node that samples
                         # read is empty where the points miss the body's edge
@@ -52,14 +57,31 @@ class Eulerian(NamedTuple):
         x, first = self.first_guesses(g, xhat, samples)
         far = self.distance(first) > FAR * self.dx
         back = preimages(g, xhat, x[~far], first[~far], self.dx, self.close)
-        J, inside = np.linalg.det(back.points.F), self.distance(back.points.points) <= 0.0
+        points, share = self.parts(g, xhat, back)
+        J, inside = np.linalg.det(points.F), share > 0.0
         sound = back.converged & inside & (J > 0.0)
-        V0 = (self.dx / self.per_cell) ** x.shape[1] / J[sound]
+        V0 = share[sound] * (self.dx / self.per_cell) ** x.shape[1] / J[sound]
         lost = np.sum(~back.converged | inside & (J <= 0.0))
         report = {"points": len(V0), "far": int(far.sum()), "lost": int(lost),
                   "outside": int(np.sum(~far) - len(V0) - lost), "iterations": back.iterations}
-        return Cloud(back.points.select(sound), self.rho * V0, V0,
+        return Cloud(points.select(sound), self.rho * V0, V0,
                      evaluate(g, self.X[samples], xhat), report)
+
+    def parts(self, g, xhat, back):
+        """Return the `Kinematics` of the parts of sub-cells within the body, and their shares of
+        the sub-cells' volume (n,), from the `Preimages` of the midpoints.
+        """
+        points = back.points
+        share = (self.distance(points.points) <= 0.0).astype(float)
+        if self.boundary_cells == WHOLE:
+            return points, share
+        sound = np.flatnonzero(back.converged & (np.linalg.det(points.F) > 0.0))
+        side = self.dx / self.per_cell
+        parts = parts_inside(g, xhat, points.select(sound), side, self.distance)
+        for old, new in zip(points, parts.points, strict=True):
+            old[sound] = new
+        share[sound] = parts.share
+        return points, share
 
     def first_guesses(self, g, xhat, samples):
         """Return all quadrature points x (n, d) around the samples, and first guesses (n, d) of

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core.grid import extent
 from ..kinematics import CLOSE, NoBody
-from .eulerian import PER_CELL, Eulerian
+from .eulerian import PER_CELL, WHOLE, Eulerian
 from .stencil_overlap import bases
 
 
@@ -31,9 +31,11 @@ class NodeCentric(NamedTuple):
     degree: int
     per_cell: int = PER_CELL
     close: float = CLOSE
+    boundary_cells: str = WHOLE
 
     feather = Eulerian.feather
-    cloud, first_guesses, places = Eulerian.cloud, Eulerian.first_guesses, Eulerian.places
+    cloud, parts = Eulerian.cloud, Eulerian.parts
+    first_guesses, places = Eulerian.first_guesses, Eulerian.places
 
     def cells(self, x):
         """Return all quadrature points (cells, l^d, d) [m] that share a sample node; positions x of

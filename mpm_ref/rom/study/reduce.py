@@ -20,7 +20,7 @@ from ..fields.polynomial_manifold import Curved, curved
 from ..latent import initial
 from ..model_file import Model
 from .errors import misfit
-from .tables import CURVED, KEYS, LDM, MODES, NETWORK, require_modes, require_nonlinear
+from .tables import CURVED, KEYS, LDM, MODES, NETWORK, require_nonlinear, require_precision
 
 STORED_LOSSES = 50      # epochs of which the loss is stored in the file
 SIDE, STEP = 0.4, 1.0 / 144.0       # largest side [m] and time step [s] of the body that the loss's
@@ -210,7 +210,7 @@ def load(path, study):
     if study.tables.model == LDM:
         require_nonlinear(kind_of(model), run.projection)
         return model
-    require_modes(kind_of(model), run.precision)
+    require_precision(kind_of(model), run.precision)
     return model._replace(field=model.field.single()) if run.precision == "single" else model
 
 

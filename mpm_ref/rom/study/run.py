@@ -16,7 +16,7 @@ from ..fields.polynomial_manifold import Curved
 from ..kinematics import CLOSE
 from ..latent import Latent, initial, nearest
 from ..projection import PositionInversion
-from ..quadrature.eulerian import Eulerian
+from ..quadrature.eulerian import BOUNDARY_CELLS, WHOLE, Eulerian
 from ..quadrature.lagrangian import CELLS, Lagrangian, Resampled, lagrangian
 from ..step import StepReport, ldm_stepper, nsf_stepper
 from .full_model import signed_distance
@@ -95,6 +95,8 @@ class RunOptions(NamedTuple):
     precision: str = "double"   # of a learned map, or "single"
     driven_weight: float = 1.0  # ours: in the projection, of a sample whose velocity is prescribed
                                 # over that of one whose is free (see `rom.prescribed`)
+    boundary_cells: str = WHOLE     # of Eulerian points, one of `eulerian.BOUNDARY_CELLS`; "cut" is
+                                    # ours
 
     @property
     def name(self):
@@ -125,10 +127,11 @@ def with_numbers(full, g, options):
 
 def ldm_model(full, g, options):
     """Return LDM's `ReducedStepper` of a `FullModel` on a map g. Raises ValueError for a quadrature
-    that does not exist, and as `require_own_points`, `require_prescribed_region`
-    and `with_precision` do.
+    that does not exist, and as `require_own_points`, `require_boundary_cells`,
+    `require_prescribed_region` and `with_precision` do.
     """
     require_own_points(full, options)
+    require_boundary_cells(options)
     require_prescribed_region(full, options)
     problem = full.problem
     make = {"lagrangian": material_quadrature, "eulerian": cell_quadrature,
@@ -149,6 +152,19 @@ def require_own_points(full, options):
         raise ValueError(f"quadrature = {options.quadrature!r} with {len(full.bodies)} bodies: "
                          f"expected {QUADRATURES[0]!r}, since its other points have one shape, one "
                          "density and one law")
+
+
+def require_boundary_cells(options):
+    """Raise ValueError for `boundary_cells` that do not exist, and for "cut" ones of a quadrature
+    without cells.
+    """
+    chosen, (_, eulerian) = options.boundary_cells, QUADRATURES
+    if chosen not in BOUNDARY_CELLS:
+        raise ValueError(f"boundary_cells = {chosen!r}: expected one of "
+                         + ", ".join(BOUNDARY_CELLS))
+    if chosen != WHOLE and options.quadrature != eulerian:
+        raise ValueError(f"boundary_cells = {chosen!r} with quadrature = {options.quadrature!r}: "
+                         f"expected {WHOLE!r}, since the points of {eulerian!r} alone are cells'")
 
 
 def with_precision(g, options, transfer):
@@ -187,7 +203,7 @@ def cell_quadrature(full, options):
     seeds = np.unique(np.floor(full.X / size), axis=0, return_index=True)[1]
     return Eulerian(full.X, full.rho, lambda X: signed_distance(X, full.shape), full.X[seeds],
                     full.problem.dx, full.problem.scheme.degree, options.per_cell,
-                    options.preimage_tolerance)
+                    options.preimage_tolerance, options.boundary_cells)
 
 
 def resampled_quadrature(full, options):

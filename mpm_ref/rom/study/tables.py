@@ -10,6 +10,7 @@ from ..fields.architecture import HIDDEN
 from ..fields.pod_fields import Sizes
 from ..latent import VELOCITIES
 from ..projection import INVERSIONS, require_tolerance
+from ..quadrature.eulerian import BOUNDARY_CELLS
 from .run import PRECISIONS, PROJECTIONS, QUADRATURES, RunOptions
 
 LDM, NSF = "ldm", "nsf"             # methods
@@ -53,7 +54,7 @@ def require_nonlinear(kind, projection):
                          "since linear projection leaves the curve in every step")
 
 
-def require_modes(kind, precision):
+def require_precision(kind, precision):
     """Raise ValueError for NSF's fields of a kind that has no single precision."""
     if precision == "single" and kind != MODES:
         raise ValueError(f"run.precision = 'single': expected 'double' for fields of kind "
@@ -157,6 +158,7 @@ class MapRunTable(StudyTable):
                                                 # from their places [dx]
     precision: str = RunOptions().precision            # of a network
     driven_weight: Positive = RunOptions().driven_weight    # of samples that are driven
+    boundary_cells: str = RunOptions().boundary_cells  # of Eulerian points
     velocity: str = RunOptions().velocity
     seed: Seed = 0                              # of the samples
 
@@ -166,6 +168,7 @@ class MapRunTable(StudyTable):
         one_of("projection", self.projection, PROJECTIONS)
         one_of("velocity", self.velocity, VELOCITIES)
         one_of("precision", self.precision, PRECISIONS)
+        one_of("boundary_cells", self.boundary_cells, BOUNDARY_CELLS)
 
     @property
     def options(self):
@@ -282,7 +285,7 @@ class FieldsTables(CommonTables, kw_only=True, rename=NAMES):
     run: FieldsRunTable = FieldsRunTable()
 
     def __post_init__(self):
-        require_modes(self.reduced_model.kind, self.run.precision)
+        require_precision(self.reduced_model.kind, self.run.precision)
         super().__post_init__()
 
 
