@@ -44,7 +44,7 @@ class Counts(NamedTuple):
     test: int
 
 
-class MethodCost(NamedTuple):
+class ArmCost(NamedTuple):
     """A method at a size."""
 
     size: str
@@ -77,14 +77,14 @@ def reduced(run):
 
 
 def rows_of(run, size, dx, counts):
-    """Return the `MethodCost`s of a size, on a grid of spacing dx [m]."""
+    """Return the `ArmCost`s of a size, on a grid of spacing dx [m]."""
     train, test = draws(*counts, SEED)
     runs = [simulated(arm(mu, dx), FIELDS) for mu in run.progress(train, "training runs")]
     training = Training(dx, train, runs)
     data, pairs = sum(one.cpu for one in runs), {}
     tests = [simulated(arm(mu, dx)) for mu in test]
     whole = float(np.mean([one.cpu for one in runs + tests]))
-    rows = [MethodCost(size, len(training.X), "full.apic", 0.0, 0.0, whole, 0.0, 0.0, 0.0)]
+    rows = [ArmCost(size, len(training.X), "full.apic", 0.0, 0.0, whole, 0.0, 0.0, 0.0)]
     for times in run.choose(quick=COARSER[:1], standard=COARSER):
         pairs[times] = [simulated(arm(mu, times * dx)) for mu in train]
     for method in run.progress([*methods(run, training, pairs)], "ways"):
@@ -106,27 +106,27 @@ def methods(run, training, pairs):
 
 
 def measured(method, size, cases, spent):
-    """Return the `MethodCost` of an `ArmMethod`; cases: the `Training`, the tests' parameters and
+    """Return the `ArmCost` of an `ArmMethod`; cases: the `Training`, the tests' parameters and
     `ArmRun`s; spent: CPU seconds of the training runs and of those on the method's coarser grid.
     """
     training, test, tests = cases
     found = [method.positions(mu) for mu in test]
     error, worst = errors(training.X, found, tests)
     is_trained = method.name.startswith((*TRAINED, *LOOKED_UP))
-    return MethodCost(size, len(training.X), method.name, error, worst,
+    return ArmCost(size, len(training.X), method.name, error, worst,
                       float(np.mean([positions.cpu for positions in found])), method.fit,
                       spent[0] if is_trained else 0.0, spent[1] if method.pairs else 0.0)
 
 
-def errors(X, found, tests):
+def errors(X, runs, tests):
     """Return the error of the displacement over all tests, and that of the worst, of
     `TimedPositions` compared with `ArmRun`s of points X (n, 3) at rest; infinite where one broke
     down.
     """
-    if any(one.x is None or not np.isfinite(one.x).all() for one in found):
+    if any(one.x is None or not np.isfinite(one.x).all() for one in runs):
         return np.inf, np.inf
     total, each = Squares(X), [Squares(X) for _ in tests]
-    for one, test, own in zip(found, tests, each, strict=True):
+    for one, test, own in zip(runs, tests, each, strict=True):
         for x, expected in zip(one.x, test.x.astype(float), strict=True):
             own.add(x, expected)
         total.sums += own.sums
@@ -141,7 +141,8 @@ def record_size(run, size, rows, counts):
     scale = f"{one.particles} particles, {counts.train} training runs, {counts.test} tests"
     for row in (row for row in rows[1:] if np.isfinite(row.error)):
         run.record(f"{name}.{row.method}", 100.0 * row.error, unit="%", comparator="info",
-                   scale=scale, note=f"of the displacement, worst test {100.0 * row.worst:.3g} %; a run takes "
+                   scale=scale, note=f"of the displacement, worst test {100.0 * row.worst:.3g} %; "
+                   "a run takes "
                    f"{row.cpu_run:.3g} CPU s, the full-order one {one.cpu_run:.3g}; before the "
                    f"first run {row.first:.3g}")
     if run.profile == "standard":

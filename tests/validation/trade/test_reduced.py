@@ -6,7 +6,7 @@ import pytest
 from validation.trade import reduced
 from validation.trade.arm import ENDS, LEVELS, arm, draws, histories, simulated
 from validation.trade.arm_models import ArmMethod, TimedPositions, Training, looked_up_methods
-from validation.trade.reduced import MethodCost, measured, record_gain
+from validation.trade.reduced import ArmCost, measured, record_gain
 
 DX = 0.08
 
@@ -85,7 +85,7 @@ class Records:
 
 def row(method, error, cpu, first=0.0):
     before = (share * first for share in (0.5, 0.3, 0.2))
-    return MethodCost("13k", 9, method, error, error, cpu, *before)
+    return ArmCost("13k", 9, method, error, error, cpu, *before)
 
 
 @pytest.mark.parametrize(("rows", "gain", "word"), [
