@@ -1,6 +1,6 @@
 """A soft arm with six parameters, by size. Top: error of the displacement against CPU time of a
 run, for full-order runs (black), what is looked up in training runs (grey), reduced models and
-coarse runs with a learned correction. Bottom: the way that is cheapest, training included, for a
+coarse runs with a learned correction. Bottom: the method that is cheapest, training included, for a
 number of runs and an error that is allowed.
 """
 
@@ -13,10 +13,12 @@ from ..common.style import scales, series
 
 NEEDS = ["trade.reduced"]
 RUNS, ERRORS = np.geomspace(1.0, 1e4, 81), np.geomspace(3e-3, 1.0, 76)
-STYLES = {              # way: (label, colour, marker)
+STYLES = {              # method: (label, colour, marker)
     "full.apic": ("full", "k", "*"), "full.mls": ("full, MLS-MPM", "0.25", "P"),
-    "coarse.2": ("grid 2 times as coarse", "#3182bd", "s"),
-    "coarse.4": ("grid 4 times as coarse", "#9ecae1", "D"),
+    "coarse.2.apic": ("grid 2 times as coarse", "#3182bd", "s"),
+    "coarse.2.mls": ("2 times as coarse, MLS-MPM", "#08519c", "s"),
+    "coarse.4.apic": ("grid 4 times as coarse", "#9ecae1", "D"),
+    "coarse.4.mls": ("4 times as coarse, MLS-MPM", "#6baed6", "D"),
     "nearest": ("nearest training run", "0.7", "v"),
     "linear": ("linear in parameters", "0.85", "^"),
     "corrected.2": ("2 times as coarse, corrected", "#e6550d", "s"),
@@ -33,7 +35,7 @@ def scale(results):
 
 
 def draw(results):
-    table = results.table(NEEDS[0], "ways")
+    table = results.table(NEEDS[0], "methods")
     sizes = series(table, ("particles",))
     figure, axes = plt.subplots(2, len(sizes), figsize=(7.0, 5.6), sharey="row", squeeze=False)
     shown = set()
@@ -49,35 +51,37 @@ def draw(results):
     figure.tight_layout()
     marks = figure.legend(handles, labels, loc="upper center", ncol=3, bbox_to_anchor=(0.5, 0.0))
     figure.add_artist(marks)
-    cheapest = [way for way in STYLES if way in shown]
-    figure.legend([Patch(color=STYLES[way][1]) for way in cheapest],
-                  [STYLES[way][0] for way in cheapest], loc="lower center", ncol=3,
+    cheapest = [method for method in STYLES if method in shown]
+    figure.legend([Patch(color=STYLES[method][1]) for method in cheapest],
+                  [STYLES[method][0] for method in cheapest], loc="lower center", ncol=3,
                   bbox_to_anchor=(0.5, 1.0), title="bottom: cheapest")
     return figure
 
 
 def points(ax, table, rows):
-    """Draw the error of each way against the CPU time of a run; the full-order run at the foot."""
-    for way, error, cpu in zip(*(table[name][rows] for name in ("way", "error", "cpu_run")),
+    """Draw the error of each method against the CPU time of a run; that of the full-order run, 0,
+    at the foot.
+    """
+    for method, error, cpu in zip(*(table[name][rows] for name in ("method", "error", "cpu_run")),
                                strict=True):
         if np.isfinite(error):
-            label, color, mark = STYLES[way]
+            label, color, mark = STYLES[method]
             ax.loglog(cpu, max(error, ERRORS[0]), mark, color=color, ms=6, mec="k", mew=0.4,
                       label=label)
     ax.set_ylim(0.8 * ERRORS[0], 2.0)
 
 
 def region(ax, table, rows):
-    """Draw which way is cheapest for a number of runs and an error; return those that are."""
+    """Draw which method is cheapest for a number of runs and an error; return those that are."""
     names = list(STYLES)
-    ways, error = table["way"][rows], table["error"][rows]
+    methods, error = table["method"][rows], table["error"][rows]
     first = sum(table[name][rows] for name in ("cpu_fit", "cpu_data", "cpu_pairs"))
     cost = first + RUNS[:, None] * table["cpu_run"][rows]
-    number = np.array([names.index(way) if way in names else -1 for way in ways])
+    number = np.array([names.index(one) if one in names else -1 for one in methods])
     allowed = (error <= ERRORS[:, None]) & (number >= 0)
     total = np.where(allowed[:, None], cost, np.inf)
     best = number[np.argmin(total, axis=2)]
-    ax.pcolormesh(RUNS, ERRORS, best, cmap=ListedColormap([STYLES[way][1] for way in names]),
+    ax.pcolormesh(RUNS, ERRORS, best, cmap=ListedColormap([STYLES[method][1] for method in names]),
                   vmin=-0.5, vmax=len(names) - 0.5, rasterized=True)
     ax.set(xscale="log", yscale="log")
     ax.grid(visible=False)

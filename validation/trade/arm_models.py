@@ -75,12 +75,13 @@ def full_method(dx, transfer="apic"):
     return ArmMethod(f"full.{transfer}", positions)
 
 
-def coarse_method(times, training):
-    """Return the `ArmMethod` of a full-order run on a grid `times` as coarse, with steps as much
-    longer, whose particles carry the fine points at the end.
+def coarse_method(times, training, transfer):
+    """Return the `ArmMethod` of a full-order run on a grid `times` as coarse, with a transfer and
+    steps as much longer, whose particles carry the fine points at the end.
     """
-    one = carrier_of(times, training)
-    return ArmMethod(f"coarse.{times}", partial(carried, times, training.dx, one.place))
+    coarse = partial(arm, dx=times * training.dx, transfer=transfer)
+    return ArmMethod(f"coarse.{times}.{transfer}",
+                     partial(carried, coarse, carrier_of(times, training).place))
 
 
 def carrier_of(times, training):
@@ -88,28 +89,37 @@ def carrier_of(times, training):
     return carrier(training.X, ldm_full_model(arm(training.mu[0], times * training.dx)).X)
 
 
-def carried(times, dx, place, mu):
-    """Return the `TimedPositions` of a coarse run; place: positions of its particles -> of fine
-    points.
+def carried(coarse, place, mu):
+    """Return the `TimedPositions` of a coarse run; coarse: parameters -> its scene; place:
+    positions of its particles -> of fine points.
     """
-    run = simulated(arm(mu, times * dx))
+    run = simulated(coarse(mu))
     start = process_time()
     x = np.array([place(state.astype(float)) for state in run.x])
     return TimedPositions(x, run.cpu + process_time() - start)
 
 
+def coarse_scene(times, dx):
+    """Return the function of parameters that gives the scene of a run that is to be corrected, on a
+    grid `times` as coarse as dx [m]: by MLS-MPM, the fastest transfer, since what differs is
+    learned.
+    """
+    return partial(arm, dx=times * dx, transfer="mls")
+
+
 def corrected_method(times, training, coarse):
-    """Return the `ArmMethod` of a coarse run with a correction learned from the training runs and
-    those of the same parameters on the coarse grid, `ArmRun`s.
+    """Return the `ArmMethod` of a run of `coarse_scene` with a correction learned from the training
+    runs and such runs of the same parameters, `ArmRun`s.
     """
     start, one = process_time(), carrier_of(times, training)
     x, x_coarse = (np.concatenate([run.x[1:] for run in runs]).astype(float)
                    for runs in (training.runs, coarse))
     smoothing = smoothing_of(one, x, x_coarse)
     fit = fit_correction(one, x, x_coarse, CORRECTIONS, smoothing)
-    return ArmMethod(f"corrected.{times}", partial(carried, times, training.dx, fit.place),
-               process_time() - start, times, f"smoothing {smoothing:g}, chosen by leaving out "
-               "each training run")
+    return ArmMethod(f"corrected.{times}",
+                     partial(carried, coarse_scene(times, training.dx), fit.place),
+                     process_time() - start, times, f"smoothing {smoothing:g}, chosen by leaving "
+                     "out each training run")
 
 
 def smoothing_of(one, x, x_coarse):

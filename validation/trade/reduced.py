@@ -17,6 +17,7 @@ from .arm import arm, draws, simulated
 from .arm_models import (
     Training,
     coarse_method,
+    coarse_scene,
     corrected_method,
     full_method,
     looked_up_methods,
@@ -33,7 +34,7 @@ ERROR, GAIN = 0.01, 5.0     # of the displacement, and the times that a model th
 SEED = 1                    # of the parameters' draws; settings were chosen on those of seed 0
 TRAINED = ("corrected", "pod", "nsf", "curved")     # methods that need the training runs
 LOOKED_UP = ("nearest", "linear", "interpolated")
-COLUMNS = ("size", "particles", "way", "error", "worst", "cpu_run", "cpu_fit", "cpu_data",
+COLUMNS = ("size", "particles", "method", "error", "worst", "cpu_run", "cpu_fit", "cpu_data",
            "cpu_pairs")
 
 
@@ -73,7 +74,7 @@ def reduced(run):
         found = rows_of(run, size, dx, counts)
         record_size(run, size, found, counts)
         rows += found
-    run.table("ways", COLUMNS, rows)
+    run.table("methods", COLUMNS, rows)
 
 
 def rows_of(run, size, dx, counts):
@@ -86,8 +87,9 @@ def rows_of(run, size, dx, counts):
     whole = float(np.mean([one.cpu for one in runs + tests]))
     rows = [ArmCost(size, len(training.X), "full.apic", 0.0, 0.0, whole, 0.0, 0.0, 0.0)]
     for times in run.choose(quick=COARSER[:1], standard=COARSER):
-        pairs[times] = [simulated(arm(mu, times * dx)) for mu in train]
-    for method in run.progress([*methods(run, training, pairs)], "ways"):
+        coarse = coarse_scene(times, dx)
+        pairs[times] = [simulated(coarse(mu)) for mu in train]
+    for method in run.progress([*methods(run, training, pairs)], "methods"):
         rows.append(measured(method, size, (training, test, tests),
                              (data, sum(one.cpu for one in pairs.get(method.pairs, ())))))
     return rows
@@ -98,7 +100,8 @@ def methods(run, training, pairs):
     yield full_method(training.dx, "mls")
     yield from looked_up_methods(training)
     for times, coarse in pairs.items():
-        yield coarse_method(times, training)
+        for transfer in ("apic", "mls"):
+            yield coarse_method(times, training, transfer)
         yield corrected_method(times, training, coarse)
     if run.profile == "standard":
         yield from nsf_methods(training)
@@ -150,14 +153,15 @@ def record_size(run, size, rows, counts):
 
 
 def record_gain(run, name, rows, scale):
-    """Record how many times the cheapest method without training, within ERROR, takes the time of
+    """Record how many times the cheapest other method within ERROR takes the time of
     the cheapest trained one, and after how many runs its training has paid.
     """
     within = [row for row in rows if row.error <= ERROR]
-    plain = min((row for row in within if not row.first), key=lambda row: row.cpu_run)
-    trained = min((row for row in within if row.first), key=lambda row: row.cpu_run, default=None)
+    plain, trained = (min((row for row in within if row.method.startswith(TRAINED) == learned),
+                          key=lambda row: row.cpu_run, default=None) for learned in (False, True))
     gain = plain.cpu_run / trained.cpu_run if trained else 0.0
-    pays = trained.first / (plain.cpu_run - trained.cpu_run) if gain > 1.0 else np.inf
+    pays = ((trained.first - plain.first) / (plain.cpu_run - trained.cpu_run) if gain > 1.0
+            else np.inf)
     note = ("no trained method is within the error" if trained is None else
             f"CPU time of a run of {plain.method} over that of {trained.method}; the training "
             f"has paid after {pays:.3g} runs")
