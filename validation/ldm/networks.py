@@ -63,7 +63,7 @@ def workshop():
     trainings = {f"shear3-{terms}": unit._replace(terms=terms) for terms in (NEITHER, NO_F,
                                                                              WORKSHOP)}
     trainings["shear3-printed"] = unit._replace(terms=WORKSHOP, reading="printed")
-    trainings["shear17"] = unit._replace(study=SHEAR17, terms=WORKSHOP, epochs=18000)
+    trainings["shear17"] = unit._replace(study=SHEAR17, terms=WORKSHOP)
     trainings["push"] = MapNet(PUSHES, 5, WORKSHOP, epochs=700, latent="free")
     return trainings
 
