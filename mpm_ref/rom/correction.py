@@ -57,7 +57,8 @@ class CoarseCorrection(NamedTuple):
 
 def carrier(X, X_coarse):
     """Return the `Carrier` of fine points X (n, d) by coarse particles X_coarse (m, d) [m]. Raises
-    ValueError for fewer particles than a linear fit needs.
+    ValueError for fewer particles than a linear fit needs, and where those nearest to a point lie
+    in a plane.
     """
     m, d = X_coarse.shape
     if m <= d:
@@ -66,6 +67,10 @@ def carrier(X, X_coarse):
     _, near = KDTree(X_coarse).query(X, min(NEAREST, m))
     arms = X_coarse[near] - X[:, None]
     basis = np.concatenate([np.ones((*arms.shape[:2], 1)), arms], axis=2)
+    if (flat := np.linalg.matrix_rank(basis) <= d).any():
+        raise ValueError(f"the {near.shape[1]} coarse particles nearest to {flat.sum()} of "
+                         f"{len(X)} fine points lie in a plane or a line: expected some off it; "
+                         "take a finer coarse grid")
     return Carrier(X, X_coarse, near, np.linalg.pinv(basis)[:, 0])
 
 
@@ -92,8 +97,13 @@ def ridge_weights(states, A, smoothing):
 
 def choose_smoothing(states, A, runs):
     """Return the one of SMOOTHING whose regression of coordinates A (S, R) on states (S, q) is
-    nearest for each run when it is left out; runs (S,): the number of each state's run.
+    nearest for each run when it is left out; runs (S,): the number of each state's run. Raises
+    ValueError for a single run, and states without displacement.
     """
+    if len(np.unique(runs)) < 2:
+        raise ValueError("one training run: expected at least two, of which each is left out once")
+    if not states.any():
+        raise ValueError("no training state has a displacement: expected runs that move")
     def left_out(smoothing):
         total = 0.0
         for run in np.unique(runs):

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .kinematics import evaluate
 from .projection import project_position, project_velocity
 
 VELOCITIES = ("previous", "latest", "difference", "transported")
@@ -68,7 +69,7 @@ def initial(g, X, x=None, v=None, xhat=None):
 def velocities(field, latent, dt, samples, v0=None):
     """Return {name: function of `Kinematics` -> v (n, d) [m/s]} of VELOCITIES, in a step of length
     dt [s] with these points as samples. v0: velocities (n, d) [m/s] of numbered points at the
-    start, which "previous" and "difference" take there; without them, those of the rates.
+    start, which all but "latest" take there; without them, those of the rates.
     """
     def latest(state):
         return state.G @ latent.vhat
@@ -85,8 +86,8 @@ def velocities(field, latent, dt, samples, v0=None):
 
     @cache
     def rates():
-        _, _, G = field.derivatives(samples, latent.xhat)
-        return project_velocity(G, field.velocity(samples, latent.fitted_at, latent.vhat)).y
+        state = evaluate(field, samples, latent.xhat)
+        return project_velocity(state.G, previous(state)).y
 
     def transported(state):
         return state.G @ rates()

@@ -27,7 +27,3 @@ def test_an_address_that_does_not_exist_is_ignored():
         return a[0]
 
     assert [hint(np.ones(3), start) for start in (-1, 3, 2**40, -2**40)] == [1.0] * 4
-
-
-def test_plain_python_does_nothing():
-    assert prefetch(np.ones(3), 0) is None

@@ -93,3 +93,19 @@ def test_what_does_not_fit_is_refused():
     for smoothing in (0.0, -1.0, np.inf):
         with pytest.raises(ValueError, match="expected a positive number"):
             fit_correction(one, x, x_coarse, 1, smoothing)
+
+
+def test_choices_without_runs_to_leave_out_are_refused():
+    states, A = np.random.default_rng(7).normal(size=(4, 6)), np.ones((4, 1))
+    with pytest.raises(ValueError, match="one training run: expected at least two"):
+        choose_smoothing(states, A, np.zeros(4))
+    with pytest.raises(ValueError, match="no training state has a displacement"):
+        choose_smoothing(0.0 * states, A, np.arange(4))
+
+
+def test_particles_in_a_plane_are_refused():
+    """A layer of particles determines no displacement off its plane."""
+    X, X_coarse = grids(3)
+    layer = X_coarse * np.array([1.0, 1.0, 0.0])
+    with pytest.raises(ValueError, match="nearest to 60 of 60 fine points lie in a plane"):
+        carrier(X, layer)

@@ -13,7 +13,7 @@ from mpm_ref.rom.quadrature.eulerian import CUT, WHOLE, Eulerian
 from mpm_ref.rom.quadrature.node_centric import node_centric, nodes_of
 from mpm_ref.rom.study.full_model import ldm_full_model, signed_distance
 from mpm_ref.rom.study.run import RunOptions, ldm_model
-from mpm_ref.scene import Cylinder
+from mpm_ref.scene import Box, Cylinder, Difference, Intersection, Sphere, Union
 from validation.common.scenes import with_
 from validation.ldm.studies import GRAVITY
 
@@ -197,3 +197,20 @@ def test_cells_are_cut_where_a_run_asks_for_it(full):
 def test_cells_that_cannot_be_cut_are_refused(full, options, said):
     with pytest.raises(ValueError, match=said):
         ldm_model(full, Affine(3), options)
+
+
+@pytest.mark.parametrize(("shape", "joined"), [
+    (Box(lower=(0.0,) * 3, upper=(1.0,) * 3), False),
+    (Union(shapes=(Box(lower=(0.0,) * 3, upper=(1.0,) * 3),)), True),
+    (Difference(shape=Box(lower=(0.0,) * 3, upper=(1.0,) * 3),
+                minus=(Sphere(center=(0.5,) * 3, radius=0.2),)), False),
+    (Intersection(shapes=(Union(shapes=(Sphere(center=(0.5,) * 3, radius=0.2),)),)), True)])
+def test_shapes_with_seams_are_not_cut(full, shape, joined):
+    """At the seam of two parts the distance is 0 inside the body."""
+    options = RunOptions("eulerian", boundary_cells="cut")
+    one = full._replace(shape=shape)
+    if not joined:
+        ldm_model(one, Affine(3), options)
+        return
+    with pytest.raises(ValueError, match="of a body made by a union: expected 'whole'"):
+        ldm_model(one, Affine(3), options)

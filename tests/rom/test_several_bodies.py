@@ -18,9 +18,10 @@ from mpm_ref.rom.quadrature.lagrangian import lagrangian
 from mpm_ref.rom.sampling import PER_GROUP
 from mpm_ref.rom.snapshots import Snapshots
 from mpm_ref.rom.step import ldm_stepper
+from mpm_ref.rom.study import run as run_module
 from mpm_ref.rom.study.full_model import field_of, ldm_full_model
 from mpm_ref.rom.study.reduce import map_misfit
-from mpm_ref.rom.study.run import RunOptions, ldm_model, ldm_run
+from mpm_ref.rom.study.run import RunOptions, ldm_model, ldm_run, with_numbers
 from mpm_ref.rom.study.samples import random_draw
 from mpm_ref.scene import build, loads
 from mpm_ref.simulate import simulate
@@ -136,7 +137,7 @@ def test_a_run_on_its_own_displacements_is_that_of_the_full_model(transfer, most
 
 
 def test_a_run_of_one_body_is_that_of_its_parts_alone():
-    """Bit for bit: places at rest name its points, and its one law is that of all."""
+    """Bit for bit, whether points have places at rest or numbers; its one law is that of all."""
     hard = SCENE.index('[[body]]\nname = "hard"')
     scene = loads((SCENE[:hard] + SCENE[SCENE.index("[[fixed]]"):]).replace(
         "density = 1000.0", "density = 1000.0\nvelocity = { linear = [1.0, -1.0] }").replace(
@@ -191,6 +192,37 @@ def test_misfit_tells_points_in_one_place_apart(d, kind):
 def test_other_maps_have_no_numbers(d):
     with pytest.raises(ValueError, match="a map of the type Affine for several bodies"):
         numbered(Affine(d))
+
+
+def test_a_run_of_several_bodies_takes_maps_of_modes_alone():
+    full = ldm_full_model(loads(SCENE))
+    with pytest.raises(ValueError, match="a map of the type Affine for several bodies"):
+        ldm_run(full, Affine(2), RunOptions(), np.zeros(6))
+
+
+@pytest.mark.parametrize("transfer", ["pic", "apic", "mls"])
+@pytest.mark.parametrize("options", [
+    RunOptions(points=12, samples="pivoted"), RunOptions(points=12, samples="kept"),
+    RunOptions(driven_weight=16.0), RunOptions(projection="nonlinear")],
+    ids=["pivoted", "kept", "weights", "nonlinear"])
+def test_numbers_of_points_change_no_bit(options, transfer, monkeypatch):
+    """A run on modes by the numbers of points is that by their places at rest."""
+    hard = SCENE.index('[[body]]\nname = "hard"')
+    scene = loads((SCENE[:hard] + SCENE[SCENE.index("[[fixed]]"):]).replace(
+        "steps = 8", "steps = 8\nevery = 1").replace('"pic"', f'"{transfer}"'))
+    x, F = simulated(scene)
+    full = ldm_full_model(scene)
+    g = modes(full.X, x, F, 4)
+    assert with_numbers(full, g, options)[0].by_number
+    assert with_numbers(full, g, RunOptions("eulerian")) == (full, g)
+
+    def found():
+        states = ldm_run(full, g, options, np.zeros(4)).states()
+        return np.array([state.latent.xhat for state in states])
+
+    by_number = found()
+    monkeypatch.setattr(run_module, "with_numbers", lambda full, g, options: (full, g))
+    assert np.array_equal(by_number, found())
 
 
 def apart(X, d):

@@ -5,10 +5,11 @@ import json
 import numpy as np
 import pytest
 from command_line import assert_told, mpm_ref
-from two_blocks import STEPS, write
+from two_blocks import SCENE, STEPS, write
 
 from mpm_ref.rom.study import dataset, evaluate, generate, reduce
 from mpm_ref.rom.study.study import load
+from mpm_ref.scene import build
 from mpm_ref.store.results import Results
 
 
@@ -53,6 +54,7 @@ def test_a_reduced_run_has_the_bodies_of_the_full_one(made, tmp_path, points):
             for name in ("m", "V0"):
                 assert np.array_equal(reduced.field(body, name), full.field(body, name))
             x, expected = (one.field(body, "x", STEPS) for one in (reduced, full))
+            assert np.allclose(*(one.field(body, "v", 0) for one in (reduced, full)), atol=1e-12)
             moved = np.linalg.norm(expected - full.field(body, "x", 0))
             assert np.linalg.norm(x - expected) < 0.03 * moved
         F, tau = (reduced.field("hard", name, STEPS) for name in ("F", "tau"))
@@ -89,8 +91,10 @@ def test_a_curved_map_is_one_of_several_bodies_too(made):
     (("[map]", '[run]\nquadrature = "resampled"\n\n[map]'),
      "quadrature = 'resampled' with 2 bodies"),
     (('kind = "modes"', 'kind = "network"'), "map.kind = 'network' with 2 bodies"),
-], ids=["eulerian", "resampled", "network"])
-def test_what_is_for_a_single_body_is_refused_before_runs_are_made(tmp_path, edit, words):
+    (("[map]", '[run]\nboundary_cells = "cut"\n\n[map]'),
+     "boundary_cells = 'cut' with quadrature = 'lagrangian'"),
+], ids=["eulerian", "resampled", "network", "cut"])
+def test_what_two_bodies_do_not_have_is_refused_before_runs_are_made(tmp_path, edit, words):
     study = write(tmp_path, edit)
     done = mpm_ref("rom", "generate", study, "--out", tmp_path / "data", "--workers", 1)
     assert_told(done, 2, words)
@@ -106,3 +110,17 @@ def test_a_network_is_refused_before_a_training(made, tmp_path):
 def test_several_bodies_are_shown_at_their_own_points(made, tmp_path):
     done = run(made, tmp_path / "run.h5", "--set", "v=1", "--points-out", 100)
     assert_told(done, 2, "--points-out 100: reduced runs of several bodies", "leave it out")
+
+
+def test_a_weight_without_prescribed_nodes_is_refused_before_runs_are_made(tmp_path):
+    study = write(tmp_path, ("[map]", "[run]\ndriven_weight = 4.0\n\n[map]"),
+                  scene=SCENE[:SCENE.index("[[fixed]]")])
+    done = mpm_ref("rom", "generate", study, "--out", tmp_path / "data", "--workers", 1)
+    assert_told(done, 2, "driven_weight = 4: expected 1")
+    assert not (tmp_path / "data").exists()
+
+
+def test_snapshots_of_several_bodies_come_from_a_study(made):
+    study = load(made / "study.toml")
+    with pytest.raises(ValueError, match="2 bodies: expected one"):
+        dataset.simulate_snapshots([build(study.scene(study.mu[0]))], study.mu[:1])

@@ -105,5 +105,6 @@ def swinging_states(one, g, rest, options, x):
     yield g.place(one.X, latent.xhat)
     for k in range(first, clock.steps):
         t = k * clock.dt
-        latent, _ = stepper.step(latent, sampler(t, latent).points, t, clock.dt)
+        samples = sampler(t, latent)
+        latent, _ = stepper.step(latent, samples.points, t, clock.dt, samples.weights)
         yield g.place(one.X, latent.xhat)

@@ -1,15 +1,19 @@
 """When a reduced or learned model pays: error of the displacement against CPU time, training
 included, on a soft arm with six parameters of which few runs are known.
 
-The cost of N runs is that of the training runs, of the fit, and N times that of a run; full-order
-runs and those on coarser grids have no training. A method is the cheapest for an error if no
+The cost of N runs is that of the training runs, of the fit, and N times that of the steps of a run,
+by one thread; what is set up before the first step is left out everywhere. Errors are those of
+agreement with the full-order run, whatever its own error is. Full-order runs and those on coarser
+grids have no training. A method is the cheapest for an error if no
 other one with at most this error costs less.
 """
 
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
+from mpm_ref.core.jit import set_threads
 from mpm_ref.rom.study.errors import Squares
 
 from ..common.registry import experiment
@@ -68,12 +72,14 @@ class ArmCost(NamedTuple):
             profiles=("quick", "standard"), budget={"quick": 8, "standard": 1800})
 def reduced(run):
     """Measure every method at each size; record the cheapest of those that keep the error."""
-    rows = []
+    rows, threads = [], numba.get_num_threads()
+    set_threads(1)
     for size, dx in run.progress(run.choose(quick=QUICK, standard=GRIDS).items(), "sizes"):
         counts = Counts(*run.choose(quick=(4, 1), standard=(16, 3 if dx > SMALL else 2)))
         found = rows_of(run, size, dx, counts)
         record_size(run, size, found, counts)
         rows += found
+    set_threads(threads)
     run.table("methods", COLUMNS, rows)
 
 

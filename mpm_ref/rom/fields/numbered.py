@@ -44,6 +44,11 @@ class NumberedModes(NamedTuple):
         return self.U[points] @ vhat
 
 
+def is_numbered(g):
+    """Return whether a map takes numbers of points."""
+    return isinstance(g.modes if isinstance(g, Curved) else g, NumberedModes)
+
+
 def numbered(g):
     """Return `PodModes`, or a `Curved` map of such, with numbers as points. Raises ValueError for
     any other map.

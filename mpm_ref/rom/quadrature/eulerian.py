@@ -15,8 +15,8 @@ from .stencil_overlap import stencil_overlap
 PER_CELL = 2        # quadrature points of a cell per axis, l
 FAR = 1.0           # distance of a first guess from the body at which its point is not in it [dx]
 WHOLE, CUT = "whole", "cut"
-BOUNDARY_CELLS = (WHOLE, CUT)   # what a sub-cell counts by that the body's surface cuts: as a whole
-                                # or not at all by its midpoint, or the part of it in the body
+BOUNDARY_CELLS = (WHOLE, CUT)   # how a sub-cell counts that the body's surface cuts: as a whole or
+                                # not at all by its midpoint, or by the part of it in the body
 
 
 class Eulerian(NamedTuple):

@@ -29,6 +29,7 @@ class MapDisplay(NamedTuple):
     X: np.ndarray       # (n, d) at rest [m]; of several bodies, numbers (n,)
     body: Body          # these points with their masses, in their own order
     velocity: str       # one of `rom.latent.VELOCITIES`
+    v0: np.ndarray | None = None    # velocities at the start [m/s] of points that have numbers
 
     @property
     def count(self):
@@ -40,7 +41,7 @@ class MapDisplay(NamedTuple):
         [s]: length of the step that led here.
         """
         points = evaluate(self.g, self.X, latent.xhat)
-        v = velocities(self.g, latent, dt, self.X)[self.velocity](points)
+        v = velocities(self.g, latent, dt, self.X, self.v0)[self.velocity](points)
         particles = self.body.particles._replace(x=points.x, v=v, F=points.F)
         body = self.body._replace(particles=particles)
         initial_stress(body)
@@ -65,7 +66,7 @@ class BodiesDisplay(NamedTuple):
 def bodies_display(g, full, velocity):
     """Return the `BodiesDisplay` of a map of numbered points at those of a `FullModel`."""
     points = zip(full.bodies, full.body_points, strict=True)
-    return BodiesDisplay(tuple(MapDisplay(g, numbers[body.id], body, velocity)
+    return BodiesDisplay(tuple(MapDisplay(g, numbers[body.id], body, velocity, full.v)
                                for body, numbers in points))
 
 

@@ -151,9 +151,24 @@ def prescribed_regions(problem):
     return () if problem.conditions is None else problem.conditions.prescribed
 
 
+def has_seams(shape):
+    """Return whether a shape of a scene has parts that are joined: there its `signed_distance` is
+    nearer to 0 than the surface is.
+    """
+    match shape:
+        case Union():
+            return True
+        case Intersection():
+            return any(map(has_seams, shape.shapes))
+        case Difference():
+            return has_seams(shape.shape) or any(map(has_seams, shape.minus))
+    return False
+
+
 def signed_distance(X, shape):
     """Return signed distances (n,) of points X (n, d) from a shape of a scene [m], negative inside;
-    of shapes made of others, a bound that is not larger.
+    of shapes made of others, a bound that is not larger outside, and inside not where parts are
+    joined.
     """
     match shape:
         case Union():

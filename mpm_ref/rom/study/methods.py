@@ -24,8 +24,20 @@ from .reduce import (
     train_fields,
     train_map,
 )
-from .run import FieldRunOptions, ldm_run, nsf_run, require_own_points
-from .samples import ENOUGH, chosen_samples, random_draw, require_enough_samples
+from .run import (
+    FieldRunOptions,
+    ldm_run,
+    nsf_run,
+    require_boundary_cells,
+    require_own_points,
+)
+from .samples import (
+    ENOUGH,
+    chosen_samples,
+    random_draw,
+    require_enough_samples,
+    require_prescribed_region,
+)
 from .tables import LDM, NSF
 
 
@@ -61,9 +73,14 @@ def every_step(base, changes):
 
 
 def require_ldm_options(study, full):
-    """Raise ValueError for a map, or a quadrature, that a `FullModel` of several bodies has not."""
+    """Raise ValueError for a map, or a quadrature, that a `FullModel` of several bodies has not,
+    and for options that its shape, its regions or the quadrature do not have.
+    """
+    options = study.tables.run.options
     require_one_body(study)
-    require_own_points(full, study.tables.run.options)
+    require_own_points(full, options)
+    require_boundary_cells(full, options)
+    require_prescribed_region(full, options)
 
 
 def map_of_run(g, full, mu):

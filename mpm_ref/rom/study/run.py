@@ -10,7 +10,7 @@ import numpy as np
 from ...sampling import Regular, sample
 from ...shapes.inside import solid
 from ..fields.blocks import body_blocks
-from ..fields.numbered import numbered
+from ..fields.numbered import is_numbered, numbered
 from ..fields.pod import PodModes
 from ..fields.polynomial_manifold import Curved
 from ..kinematics import CLOSE
@@ -19,7 +19,7 @@ from ..projection import PositionInversion
 from ..quadrature.eulerian import BOUNDARY_CELLS, WHOLE, Eulerian
 from ..quadrature.lagrangian import CELLS, Lagrangian, Resampled, lagrangian
 from ..step import StepReport, ldm_stepper, nsf_stepper
-from .full_model import signed_distance
+from .full_model import has_seams, signed_distance
 from .samples import (
     ENOUGH,
     SampleSet,
@@ -109,6 +109,7 @@ def ldm_run(full, g, options, rest, seed=0):
     at rest. Raises ValueError as `ldm_model` does; its states, as `samples.ldm_sampler` does.
     """
     clock = full.problem.clock
+    with_precision(g, options, full.problem.scheme.transfer)
     full, g = with_numbers(full, g, options)
     return ReducedRun(ldm_model(full, g, options), lambda: ldm_start(full, g, rest),
                       lambda xhat: ldm_sampler(full, g, options, xhat, seed), clock.dt, clock.steps)
@@ -116,8 +117,11 @@ def ldm_run(full, g, options, rest, seed=0):
 
 def with_numbers(full, g, options):
     """Return a `FullModel` and a map by the numbers of points, where a run evaluates modes at the
-    points of their data alone: the same values, without a search for each point.
+    points of their data alone: the same values, without a search for each point. Raises ValueError
+    for a map of several bodies that is not of modes.
     """
+    if len(full.bodies) > 1 and not is_numbered(g):
+        return full, numbered(g)
     modes = g.modes if isinstance(g, Curved) else g
     if (isinstance(modes, PodModes) and options.quadrature == QUADRATURES[0]
             and np.array_equal(modes.X, full.X)):
@@ -131,7 +135,7 @@ def ldm_model(full, g, options):
     `require_prescribed_region` and `with_precision` do.
     """
     require_own_points(full, options)
-    require_boundary_cells(options)
+    require_boundary_cells(full, options)
     require_prescribed_region(full, options)
     problem = full.problem
     make = {"lagrangian": material_quadrature, "eulerian": cell_quadrature,
@@ -154,9 +158,9 @@ def require_own_points(full, options):
                          "density and one law")
 
 
-def require_boundary_cells(options):
+def require_boundary_cells(full, options):
     """Raise ValueError for `boundary_cells` that do not exist, and for "cut" ones of a quadrature
-    without cells.
+    without cells, or of a shape that is a union, whose distance at the seams is 0 inside the body.
     """
     chosen, (_, eulerian) = options.boundary_cells, QUADRATURES
     if chosen not in BOUNDARY_CELLS:
@@ -165,6 +169,9 @@ def require_boundary_cells(options):
     if chosen != WHOLE and options.quadrature != eulerian:
         raise ValueError(f"boundary_cells = {chosen!r} with quadrature = {options.quadrature!r}: "
                          f"expected {WHOLE!r}, since the points of {eulerian!r} alone are cells'")
+    if chosen != WHOLE and has_seams(full.shape):
+        raise ValueError(f"boundary_cells = {chosen!r} of a body made by a union: expected "
+                         f"{WHOLE!r}, since cells at the seams of its parts would be cut too")
 
 
 def with_precision(g, options, transfer):
@@ -235,7 +242,8 @@ class FieldRunOptions(NamedTuple):
 
 def nsf_run(full, fields, options, rest):
     """Return NSF's `ReducedRun` of a `FullModel` on fields with `FieldRunOptions`, until the scene
-    ends. rest: latent coordinates near the start. Raises ValueError as `require_valid_sets` does.
+    ends. rest: latent coordinates near the start. Raises ValueError as `require_valid_sets` and
+    `nsf_model` do.
     """
     require_valid_sets(options.samples, len(full.X))
     clock = full.problem.clock

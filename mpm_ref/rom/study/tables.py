@@ -157,7 +157,8 @@ class MapRunTable(StudyTable):
     preimage_tolerance: Positive = RunOptions().preimage_tolerance  # distance of Eulerian points
                                                 # from their places [dx]
     precision: str = RunOptions().precision            # of a network
-    driven_weight: Positive = RunOptions().driven_weight    # of samples that are driven
+    driven_weight: Positive = RunOptions().driven_weight    # largest weight, of a
+                                                # sample whose velocity is prescribed
     boundary_cells: str = RunOptions().boundary_cells  # of Eulerian points
     velocity: str = RunOptions().velocity
     seed: Seed = 0                              # of the samples
