@@ -88,13 +88,11 @@ def simulate_snapshots(problems, mu, every=1):
     """Return the `Snapshots` of runs of problems that differ by parameters mu (s, parameters)
     alone; of one point in `every`.
 
-    Raises ValueError where their points or time steps differ, and for more than one body.
+    Raises ValueError where their points or time steps differ, and as `history` does for more than
+    one body.
     """
     rest, dt, runs = None, None, []
     for problem in problems:
-        if len(problem.bodies) > 1:
-            raise ValueError(f"{len(problem.bodies)} bodies: expected one; runs of several are "
-                             "generated and loaded by a study (`load_snapshots`)")
         points = points_of(problem.bodies[:1])[:3]
         if rest is None:
             rest, dt = points, problem.clock.dt
