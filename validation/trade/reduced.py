@@ -75,7 +75,7 @@ def reduced(run):
     rows, threads = [], numba.get_num_threads()
     set_threads(1)
     for size, dx in run.progress(run.choose(quick=QUICK, standard=GRIDS).items(), "sizes"):
-        counts = Counts(*run.choose(quick=(4, 1), standard=(16, 3 if dx > SMALL else 2)))
+        counts = Counts(*run.choose(quick=(16, 2), standard=(16, 3 if dx > SMALL else 2)))
         found = rows_of(run, size, dx, counts)
         record_size(run, size, found, counts)
         rows += found
@@ -154,8 +154,19 @@ def record_size(run, size, rows, counts):
                    "a run takes "
                    f"{row.cpu_run:.3g} CPU s, the full-order one {one.cpu_run:.3g}; before the "
                    f"first run {row.first:.3g}")
+    record_correction(run, name, rows, scale)
     if run.profile == "standard":
         record_gain(run, name, rows, scale)
+
+
+def record_correction(run, name, rows, scale):
+    """Record the error of each corrected run over that of the same run without a correction."""
+    error = {row.method: row.error for row in rows}
+    for times in (times for times in COARSER if f"corrected.{times}" in error):
+        run.record(f"{name}.corrected.{times}.left",
+                   error[f"corrected.{times}"] / error[f"coarse.{times}.mls"], unit="1",
+                   comparator="<=", bound=1.0, scale=scale,
+                   note="error over that of the same coarse run without a correction")
 
 
 def record_gain(run, name, rows, scale):
