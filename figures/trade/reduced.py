@@ -15,6 +15,12 @@ NEEDS = ["trade.reduced"]
 RUNS, ERRORS = np.geomspace(1.0, 1e4, 81), np.geomspace(3e-3, 1.0, 76)
 STYLES = {              # method: (label, colour, marker)
     "full.apic": ("full", "k", "*"), "full.mls": ("full, MLS-MPM", "0.25", "P"),
+    "coarse.1.25.apic": ("grid 1.25 times as coarse", "#dadaeb", "p"),
+    "coarse.1.25.mls": ("1.25 times as coarse, MLS-MPM", "#54278f", "p"),
+    "coarse.1.5.apic": ("grid 1.5 times as coarse", "#9e9ac8", "X"),
+    "coarse.1.5.mls": ("1.5 times as coarse, MLS-MPM", "#6a51a3", "X"),
+    "coarse.1.75.apic": ("grid 1.75 times as coarse", "#9ecae1", ">"),
+    "coarse.1.75.mls": ("1.75 times as coarse, MLS-MPM", "#2171b5", ">"),
     "coarse.2.apic": ("grid 2 times as coarse", "#3182bd", "s"),
     "coarse.2.mls": ("2 times as coarse, MLS-MPM", "#08519c", "s"),
     "coarse.4.apic": ("grid 4 times as coarse", "#9ecae1", "D"),

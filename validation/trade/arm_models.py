@@ -190,35 +190,37 @@ def map_method(name, training, g, options, fit):
     return ArmMethod(name, positions, fit, settings=f"r = {g.r}, {points} samples")
 
 
-def pod_methods(training, bent):
-    """Yield the `ArmMethod`s of LDM on POD modes, with all samples and a few, and if it is to be
-    `bent` on a curved map of as many.
+def pod_methods(training, whole):
+    """Yield the `ArmMethod`s of LDM on POD modes with a few samples, and if it is to be the `whole`
+    comparison with all, and on a curved map of as many modes.
     """
     start = process_time()
     x, F = (np.concatenate([run.fields[name] for run in training.runs]).astype(float)
             for name in ("x", "F"))
     found = basis(training.X, x, F, MODES)
     fit = process_time() - start
-    yield map_method("pod.all", training, found.modes, RunOptions(), fit)
     yield map_method("pod.few", training, found.modes, RunOptions(points=FEW), fit)
-    if bent:
+    if whole:
+        yield map_method("pod.all", training, found.modes, RunOptions(), fit)
         start = process_time()
         g = curved(found, CURVED, 2)
         yield map_method("curved", training, g, RunOptions(projection="nonlinear"),
                          fit + process_time() - start)
 
 
-def nsf_methods(training):
-    """Yield the `ArmMethod`s of NSF's reduced run on fields of modes, with all samples and with a
-    few that have weights.
+def nsf_methods(training, whole):
+    """Yield the `ArmMethod`s of NSF's reduced run on fields of modes, with a few samples that have
+    weights, and if it is to be the `whole` comparison with all.
     """
     start = process_time()
     scene = arm(training.mu[0], training.dx)
     fields, xhat = fit_pod_fields(histories(training.runs, scene, training.mu), NSF,
                                   BLOCK * training.dx)
     n, rest, fit = len(training.X), xhat[:, 0].mean(axis=0), process_time() - start
-    for name, samples in (("all", partial(drawn_samples, n, n, 0)),
-                          ("few", partial(weighted_samples, fields, n, FEW, 0))):
+    kinds = {"few": partial(weighted_samples, fields, n, FEW, 0)}
+    if whole:
+        kinds["all"] = partial(drawn_samples, n, n, 0)
+    for name, samples in kinds.items():
         start = process_time()
         sets = (samples(),)
         yield ArmMethod(f"nsf.{name}", partial(field_positions, training.dx, fields, sets, rest),

@@ -32,7 +32,8 @@ from .arm_models import (
 QUICK = {"2k": 0.04}
 GRIDS = {"13k": 0.02, "43k": 0.04 / 3.0, "101k": 0.01}     # dx [m]
 SMALL = 0.015               # dx above which all methods are tried, on more tests [m]
-COARSER = (2, 4)
+COARSER = (2, 4)            # times as coarse, of the runs that are corrected
+PLAIN = (1.25, 1.5, 1.75, 2, 4)     # ... and of those that are not
 FIELDS = ("x", "F", "tau", "C")
 ERROR, GAIN = 0.01, 5.0     # of the displacement, and the times that a model that pays is cheaper
 SEED = 1                    # of the parameters' draws; settings were chosen on those of seed 0
@@ -72,14 +73,22 @@ class ArmCost(NamedTuple):
             profiles=("quick", "standard"), budget={"quick": 8, "standard": 1800})
 def reduced(run):
     """Measure every method at each size; record the cheapest of those that keep the error."""
-    rows, threads = [], numba.get_num_threads()
+    threads = numba.get_num_threads()
     set_threads(1)
+    try:
+        compare_sizes(run)
+    finally:
+        set_threads(threads)
+
+
+def compare_sizes(run):
+    """Record all methods of all sizes."""
+    rows = []
     for size, dx in run.progress(run.choose(quick=QUICK, standard=GRIDS).items(), "sizes"):
         counts = Counts(*run.choose(quick=(16, 2), standard=(16, 3 if dx > SMALL else 2)))
         found = rows_of(run, size, dx, counts)
         record_size(run, size, found, counts)
         rows += found
-    set_threads(threads)
     run.table("methods", COLUMNS, rows)
 
 
@@ -105,12 +114,13 @@ def methods(run, training, pairs):
     """Yield all `ArmMethod`s but the full-order run; at quick without reduced models."""
     yield full_method(training.dx, "mls")
     yield from looked_up_methods(training)
-    for times, coarse in pairs.items():
+    for times in run.choose(quick=COARSER[:1], standard=PLAIN):
         for transfer in ("apic", "mls"):
             yield coarse_method(times, training, transfer)
+    for times, coarse in pairs.items():
         yield corrected_method(times, training, coarse)
     if run.profile == "standard":
-        yield from nsf_methods(training)
+        yield from nsf_methods(training, training.dx > SMALL)
         yield from pod_methods(training, training.dx > SMALL)
 
 

@@ -161,7 +161,8 @@ def has_seams(shape):
         case Intersection():
             return any(map(has_seams, shape.shapes))
         case Difference():
-            return has_seams(shape.shape) or any(map(has_seams, shape.minus))
+            return (has_seams(shape.shape) or len(shape.minus) > 1
+                    or any(map(has_seams, shape.minus)))
     return False
 
 

@@ -118,10 +118,14 @@ def ldm_run(full, g, options, rest, seed=0):
 def with_numbers(full, g, options):
     """Return a `FullModel` and a map by the numbers of points, where a run evaluates modes at the
     points of their data alone: the same values, without a search for each point. Raises ValueError
-    for a map of several bodies that is not of modes.
+    for a map of several bodies that is not of modes of their points.
     """
-    if len(full.bodies) > 1 and not is_numbered(g):
-        return full, numbered(g)
+    if len(full.bodies) > 1:
+        g = g if is_numbered(g) else numbered(g)
+        if not np.array_equal((g.modes if isinstance(g, Curved) else g).X, full.X):
+            raise ValueError("modes of other points than those of the bodies: expected a map of "
+                             "the same scene's training runs")
+        return full, g
     modes = g.modes if isinstance(g, Curved) else g
     if (isinstance(modes, PodModes) and options.quadrature == QUADRATURES[0]
             and np.array_equal(modes.X, full.X)):
