@@ -190,9 +190,9 @@ def map_method(name, training, g, options, fit):
     return ArmMethod(name, positions, fit, settings=f"r = {g.r}, {points} samples")
 
 
-def pod_methods(training, whole):
-    """Yield the `ArmMethod`s of LDM on POD modes with a few samples, and if it is to be the `whole`
-    comparison with all, and on a curved map of as many modes.
+def pod_methods(training, with_all):
+    """Yield the `ArmMethod`s of LDM on POD modes with a few samples; and `with_all` samples, then
+    on a curved map of as many modes too.
     """
     start = process_time()
     x, F = (np.concatenate([run.fields[name] for run in training.runs]).astype(float)
@@ -200,7 +200,7 @@ def pod_methods(training, whole):
     found = basis(training.X, x, F, MODES)
     fit = process_time() - start
     yield map_method("pod.few", training, found.modes, RunOptions(points=FEW), fit)
-    if whole:
+    if with_all:
         yield map_method("pod.all", training, found.modes, RunOptions(), fit)
         start = process_time()
         g = curved(found, CURVED, 2)
@@ -208,9 +208,9 @@ def pod_methods(training, whole):
                          fit + process_time() - start)
 
 
-def nsf_methods(training, whole):
+def nsf_methods(training, with_all):
     """Yield the `ArmMethod`s of NSF's reduced run on fields of modes, with a few samples that have
-    weights, and if it is to be the `whole` comparison with all.
+    weights, and `with_all`.
     """
     start = process_time()
     scene = arm(training.mu[0], training.dx)
@@ -218,7 +218,7 @@ def nsf_methods(training, whole):
                                   BLOCK * training.dx)
     n, rest, fit = len(training.X), xhat[:, 0].mean(axis=0), process_time() - start
     kinds = {"few": partial(weighted_samples, fields, n, FEW, 0)}
-    if whole:
+    if with_all:
         kinds["all"] = partial(drawn_samples, n, n, 0)
     for name, samples in kinds.items():
         start = process_time()
