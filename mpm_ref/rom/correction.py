@@ -1,11 +1,12 @@
 """A run on a coarse grid with a correction that is learned from pairs of runs, coarse and fine.
 
-    x(X) = x_c(X) + sum_k a_k D_k(X),    a = A (K + lam I)^-1 C u,    K = C C^T
+    x(X) = x_c(X) + sum_k a_k D_k(X),    a = A^T (K + lam I)^-1 C u,    K = C C^T
 
 u are the displacements of the coarse run's particles in a state, one row of C those of a training
 state; x_c(X) is where they carry a fine point X, by a linear fit to the nearest ones. What is
-missing to the fine run's positions in the training states, D_k by their coordinates A, is a linear
-function of u by ridge regression, with lam in mean squares of u. So the correction knows the state
+missing to the fine run's positions in the training states is a sum of modes D_k [m] with
+coordinates A (states, modes). These are a linear function of u by ridge regression, with lam in mean
+squares of u. So the correction knows the state
 of the coarse run alone, neither time nor parameters: loads may be ones that only the run shows.
 
 It is a rival of reduced models, of the kind of multi-fidelity methods: M. C. Kennedy and A.
@@ -44,9 +45,10 @@ class CoarseCorrection(NamedTuple):
     """A `Carrier` with a learned correction of R modes, from S training states."""
 
     carrier: Carrier
-    modes: np.ndarray       # (n, d, R) of the correction [m]
-    states: np.ndarray      # (S, m d) displacements of the coarse particles [m]
+    modes: np.ndarray       # (n, d, R) D of the correction [m]
+    states: np.ndarray      # (S, m d) C, displacements of the coarse particles [m]
     weights: np.ndarray     # (S, R) (K + lam I)^-1 A
+    smoothing: float        # lam over the mean square of the displacements
 
     def place(self, x_coarse):
         """Return the corrected x (n, d) [m] for x_coarse (m, d) of the coarse particles [m]."""
@@ -74,17 +76,22 @@ def carrier(X, X_coarse):
     return Carrier(X, X_coarse, near, np.linalg.pinv(basis)[:, 0])
 
 
-def fit_correction(one, x, x_coarse, R, smoothing):
+def fit_correction(one, x, x_coarse, R, runs, smoothing=None):
     """Return the `CoarseCorrection` of R modes from training states: x (S, n, d) of the fine points
-    of a `Carrier` and x_coarse (S, m, d) of its particles [m]. smoothing: lam over the mean square
-    of the displacements. Raises ValueError for more modes than the states hold.
+    of a `Carrier` and x_coarse (S, m, d) of its particles [m], of runs of these numbers (S,).
+    smoothing: lam over the mean square of the displacements; None: by `choose_smoothing`.
+
+    Raises ValueError for states that are no pairs or not finite, a smoothing that is not positive,
+    more modes than the states hold, and as `choose_smoothing` does.
     """
     require_pairs(one, x, x_coarse, smoothing)
     states = (x_coarse - one.X_coarse).reshape(len(x_coarse), -1)
     missing = np.array([fine - one.place(coarse) for fine, coarse in
                         zip(x, x_coarse, strict=True)])
     modes, A = directions(np.zeros_like(one.X), missing, R)
-    return CoarseCorrection(one, modes, states, ridge_weights(states, A, smoothing))
+    if smoothing is None:
+        smoothing = choose_smoothing(states, A, runs)
+    return CoarseCorrection(one, modes, states, ridge_weights(states, A, smoothing), smoothing)
 
 
 def ridge_weights(states, A, smoothing):
@@ -104,6 +111,7 @@ def choose_smoothing(states, A, runs):
         raise ValueError("one training run: expected at least two, of which each is left out once")
     if not states.any():
         raise ValueError("no training state has a displacement: expected runs that move")
+
     def left_out(smoothing):
         total = 0.0
         for run in np.unique(runs):
@@ -117,7 +125,7 @@ def choose_smoothing(states, A, runs):
 
 def require_pairs(one, x, x_coarse, smoothing):
     """Raise ValueError unless fine and coarse states are pairs of finite positions of the points of
-    a `Carrier`, and the smoothing is positive.
+    a `Carrier`, and a smoothing that is given is positive.
     """
     expected = (len(x_coarse), *one.X.shape), (len(x), *one.X_coarse.shape)
     if (x.shape, x_coarse.shape) != expected:
@@ -126,5 +134,5 @@ def require_pairs(one, x, x_coarse, smoothing):
     if not (np.isfinite(x).all() and np.isfinite(x_coarse).all()):
         raise ValueError("positions of training states that are not finite: leave out runs that "
                          "broke down")
-    if not 0.0 < smoothing < np.inf:
+    if smoothing is not None and not 0.0 < smoothing < np.inf:
         raise ValueError(f"smoothing = {smoothing}: expected a positive number, such as 1e-5")

@@ -52,19 +52,29 @@ def test_weights_of_driven_samples_are_an_option_of_a_study(made, tmp_path):
     for weight, word in (("4.0", "weighted.toml"), ("0.0", "none.toml")):
         text = (made / "bars.toml").read_text()
         (made / word).write_text(text.replace("[map]", f"[run]\ndriven_weight = {weight}\n\n[map]"))
-    done = run(made, tmp_path / "run.h5", "--set", "kick=1", study="weighted.toml")
-    assert done.exit_code == 0, done.output
+    for study in ("bars.toml", "weighted.toml"):
+        done = run(made, tmp_path / f"{study}.h5", "--set", "kick=1", study=study)
+        assert done.exit_code == 0, done.output
+    plain, weighted = (positions(tmp_path / f"{study}.h5")
+                       for study in ("bars.toml", "weighted.toml"))
+    assert abs(weighted - plain).max() > 1e-6
     assert_told(run(made, tmp_path / "none.h5", "--set", "kick=1", study="none.toml"), 2,
                 "driven_weight")
 
 
 def test_boundary_cells_without_cells_are_refused_in_a_sentence(made, tmp_path):
     text = (made / "bars.toml").read_text()
-    for quadrature, word in (("eulerian", "cut.toml"), ("lagrangian", "points.toml")):
+    for quadrature, cells, word in (("eulerian", "cut", "cut.toml"),
+                                    ("eulerian", "whole", "whole.toml"),
+                                    ("lagrangian", "cut", "points.toml")):
         (made / word).write_text(text.replace(
-            "[map]", f'[run]\nquadrature = "{quadrature}"\nboundary_cells = "cut"\n\n[map]'))
-    done = run(made, tmp_path / "run.h5", "--set", "kick=1", study="cut.toml")
-    assert done.exit_code == 0, done.output
+            "[map]",
+            f'[run]\nquadrature = "{quadrature}"\nboundary_cells = "{cells}"\n\n[map]'))
+    for study in ("cut.toml", "whole.toml"):
+        done = run(made, tmp_path / f"{study}.h5", "--set", "kick=1", study=study)
+        assert done.exit_code == 0, done.output
+    cut, whole = (positions(tmp_path / f"{study}.h5") for study in ("cut.toml", "whole.toml"))
+    assert abs(cut - whole).max() > 1e-6
     assert_told(run(made, tmp_path / "none.h5", "--set", "kick=1", study="points.toml"), 2,
                 "boundary_cells = 'cut' with quadrature = 'lagrangian': expected 'whole'")
 

@@ -37,7 +37,7 @@ def test_a_linear_error_of_coarse_runs_is_corrected(d):
         return one.place(x_coarse) + np.tensordot(a, missing, 1), x_coarse
 
     x, x_coarse = map(np.array, zip(*map(pair, amounts), strict=True))
-    fit = fit_correction(one, x, x_coarse, 3, 1e-12)
+    fit = fit_correction(one, x, x_coarse, 3, np.arange(8), 1e-12)
     expected, given = pair(np.array([0.3, -1.2, 0.7]))
     assert abs(fit.place(given) - expected).max() < 1e-8
     assert abs(one.place(given) - expected).max() > 0.1
@@ -47,7 +47,7 @@ def test_a_body_at_rest_is_not_corrected():
     X, X_coarse = grids(2)
     one, rng = carrier(X, X_coarse), np.random.default_rng(3)
     x, x_coarse = X + rng.normal(size=(5, *X.shape)), X_coarse + rng.normal(size=(5, 25, 2))
-    fit = fit_correction(one, x, x_coarse, 4, 1e-3)
+    fit = fit_correction(one, x, x_coarse, 4, np.arange(5), 1e-3)
     assert abs(fit.place(X_coarse) - X).max() < 1e-12
 
 
@@ -87,12 +87,12 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="2 coarse particles: expected at least 3"):
         carrier(X, X_coarse[:2])
     with pytest.raises(ValueError, match="as many states of each"):
-        fit_correction(one, x[:2], x_coarse, 1, 1e-3)
+        fit_correction(one, x[:2], x_coarse, 1, np.arange(3), 1e-3)
     with pytest.raises(ValueError, match="not finite"):
-        fit_correction(one, x * np.nan, x_coarse, 1, 1e-3)
+        fit_correction(one, x * np.nan, x_coarse, 1, np.arange(3), 1e-3)
     for smoothing in (0.0, -1.0, np.inf):
         with pytest.raises(ValueError, match="expected a positive number"):
-            fit_correction(one, x, x_coarse, 1, smoothing)
+            fit_correction(one, x, x_coarse, 1, np.arange(3), smoothing)
 
 
 def test_choices_without_runs_to_leave_out_are_refused():
@@ -109,3 +109,15 @@ def test_particles_in_a_plane_are_refused():
     layer = X_coarse * np.array([1.0, 1.0, 0.0])
     with pytest.raises(ValueError, match="nearest to 60 of 60 fine points lie in a plane"):
         carrier(X, layer)
+
+
+def test_a_correction_chooses_its_smoothing_by_runs():
+    X, X_coarse = grids(2)
+    one, rng = carrier(X, X_coarse), np.random.default_rng(8)
+    states, missing = rng.normal(size=(10, *X_coarse.shape)), rng.normal(size=(10, *X.shape))
+    x_coarse = np.repeat(X_coarse + states, 2, axis=0)
+    x = np.array([one.place(low) for low in x_coarse]) + np.repeat(missing, 2, axis=0)
+    pairs = fit_correction(one, x, x_coarse, 3, np.arange(20) // 2)
+    single = fit_correction(one, x, x_coarse, 3, np.arange(20))
+    assert (pairs.smoothing, single.smoothing) == (max(correction.SMOOTHING),
+                                                   min(correction.SMOOTHING))

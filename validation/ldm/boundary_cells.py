@@ -77,9 +77,10 @@ def record_mass(run, cells, nets, tests):
     """Record the largest error of the body's mass on the grid at the ends of training runs."""
     off = [error for net in nets for error in mass_errors(tests.cases[0], trained(net), cells)]
     size = 100.0 * np.sqrt(np.mean(np.square(off)))
-    run.record(f"{NAME}.mass.{cells}", 100.0 * np.abs(off).max(), unit="%", scale=tests.scale,
+    scale = f"{len(tests.X)} particles, {len(off) // len(nets)} training runs, {len(nets)} maps"
+    run.record(f"{NAME}.mass.{cells}", 100.0 * np.abs(off).max(), unit="%", scale=scale,
                comparator="info", note="largest error of the body's mass on the grid, at the ends "
-               f"of {len(off)} training runs; root mean square {size:.3g} %")
+               f"of the runs; root mean square {size:.3g} %")
 
 
 def regular_references(tests):

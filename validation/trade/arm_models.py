@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm_ref.core.blas import one_thread
-from mpm_ref.rom.correction import carrier, choose_smoothing, fit_correction
-from mpm_ref.rom.fields.pod import basis, directions
+from mpm_ref.rom.correction import carrier, fit_correction
+from mpm_ref.rom.fields.pod import basis
 from mpm_ref.rom.fields.pod_fields import Sizes, fit_pod_fields
 from mpm_ref.rom.fields.polynomial_manifold import curved
 from mpm_ref.rom.step import BREAKDOWNS
@@ -41,7 +41,7 @@ class ArmMethod(NamedTuple):
     """A method for the positions of a run of parameters mu (6,)."""
 
     name: str
-    positions: Callable        # mu -> `TimedPositions`
+    positions: Callable     # mu -> `TimedPositions`
     fit: float = 0.0        # CPU seconds of what it computes from the training runs
     pairs: int = 0          # it needs training runs on a grid so many times as coarse too
     settings: str = ""      # in words
@@ -114,20 +114,11 @@ def corrected_method(times, training, coarse):
     start, one = process_time(), carrier_of(times, training)
     x, x_coarse = (np.concatenate([run.x[1:] for run in runs]).astype(float)
                    for runs in (training.runs, coarse))
-    smoothing = smoothing_of(one, x, x_coarse)
-    fit = fit_correction(one, x, x_coarse, CORRECTIONS, smoothing)
+    fit = fit_correction(one, x, x_coarse, CORRECTIONS, np.arange(len(x)) // LEVELS)
     return ArmMethod(f"corrected.{times}",
                      partial(carried, coarse_scene(times, training.dx), fit.place),
-                     process_time() - start, times, f"smoothing {smoothing:g}, chosen by leaving "
-                     "out each training run")
-
-
-def smoothing_of(one, x, x_coarse):
-    """Return the smoothing of a correction that is nearest to each training run left out."""
-    missing = np.array([fine - one.place(low) for fine, low in zip(x, x_coarse, strict=True)])
-    _, A = directions(np.zeros_like(one.X), missing, CORRECTIONS)
-    states = (x_coarse - one.X_coarse).reshape(len(x), -1)
-    return choose_smoothing(states, A, np.arange(len(x)) // LEVELS)
+                     process_time() - start, times, f"smoothing {fit.smoothing:g}, chosen by "
+                     "leaving out each training run")
 
 
 # Training runs, looked up.

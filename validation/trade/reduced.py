@@ -40,7 +40,7 @@ SEED = 1                    # of the parameters' draws; settings were chosen on 
 TRAINED = ("corrected", "pod", "nsf", "curved")     # methods that need the training runs
 LOOKED_UP = ("nearest", "linear", "interpolated")
 COLUMNS = ("size", "particles", "method", "error", "worst", "cpu_run", "cpu_fit", "cpu_data",
-           "cpu_pairs")
+           "cpu_pairs", "settings")
 
 
 class Counts(NamedTuple):
@@ -62,6 +62,7 @@ class ArmCost(NamedTuple):
     cpu_fit: float      # ... of what is computed from the training runs
     cpu_data: float     # ... of the training runs
     cpu_pairs: float    # ... of those on a coarser grid
+    settings: str = ""
 
     @property
     def first(self):
@@ -134,7 +135,8 @@ def measured(method, size, cases, spent):
     is_trained = method.name.startswith((*TRAINED, *LOOKED_UP))
     return ArmCost(size, len(training.X), method.name, error, worst,
                       float(np.mean([positions.cpu for positions in found])), method.fit,
-                      spent[0] if is_trained else 0.0, spent[1] if method.pairs else 0.0)
+                      spent[0] if is_trained else 0.0, spent[1] if method.pairs else 0.0,
+                      method.settings)
 
 
 def errors(X, runs, tests):
@@ -163,7 +165,7 @@ def record_size(run, size, rows, counts):
                    scale=scale, note=f"of the displacement, worst test {100.0 * row.worst:.3g} %; "
                    "a run takes "
                    f"{row.cpu_run:.3g} CPU s, the full-order one {one.cpu_run:.3g}; before the "
-                   f"first run {row.first:.3g}")
+                   f"first run {row.first:.3g}{'; ' + row.settings if row.settings else ''}")
     record_correction(run, name, rows, scale)
     if run.profile == "standard":
         record_gain(run, name, rows, scale)

@@ -6,7 +6,7 @@ fracture makes F meaningless, stress and affine field are separate fields (NSF):
 
     network              perceptrons: LDM's map, and NSF's three fields
     pod                  POD modes as a map: linear, the baseline of nonlinear ones
-    numbered             POD modes by the numbers of points, for maps of several bodies
+    numbered             POD modes by the numbers of points, also of several bodies
     pod_fields           NSF's three fields as sums of POD modes
     polynomial_manifold  a map on POD modes of which some are polynomials of the others
     elastic              the stress of a map's own F, on any of the maps above

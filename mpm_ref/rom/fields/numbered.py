@@ -1,8 +1,9 @@
-"""POD modes whose points are numbers instead of places at rest, for maps of several bodies.
+"""POD modes whose points are numbers instead of places at rest.
 
-Points of two bodies may have one place at rest, or be neighbours across a gap; their number says
-which body they are of. Values are those of the data alone: nothing is fitted between points, so
-that no body reads another's modes.
+A run that evaluates modes at the points of their data alone needs no search for them. Maps of
+several bodies need numbers: points of two bodies may have one place at rest, or be neighbours
+across a gap; their number says which body they are of. Values are those of the data alone: nothing
+is fitted between points, so that no body reads another's modes.
 """
 
 from typing import NamedTuple

@@ -109,7 +109,6 @@ def ldm_run(full, g, options, rest, seed=0):
     at rest. Raises ValueError as `ldm_model` does; its states, as `samples.ldm_sampler` does.
     """
     clock = full.problem.clock
-    with_precision(g, options, full.problem.scheme.transfer)
     full, g = with_numbers(full, g, options)
     return ReducedRun(ldm_model(full, g, options), lambda: ldm_start(full, g, rest),
                       lambda xhat: ldm_sampler(full, g, options, xhat, seed), clock.dt, clock.steps)
@@ -127,8 +126,8 @@ def with_numbers(full, g, options):
                              "the same scene's training runs")
         return full, g
     modes = g.modes if isinstance(g, Curved) else g
-    if (isinstance(modes, PodModes) and options.quadrature == QUADRATURES[0]
-            and np.array_equal(modes.X, full.X)):
+    at_points = options.quadrature == QUADRATURES[0] and options.precision == "double"
+    if at_points and isinstance(modes, PodModes) and np.array_equal(modes.X, full.X):
         return full._replace(by_number=True), numbered(g)
     return full, g
 
