@@ -5,9 +5,9 @@
 u are the displacements of the coarse run's particles in a state, one row of C those of a training
 state; x_c(X) is where they carry a fine point X, by a linear fit to the nearest ones. What is
 missing to the fine run's positions in the training states is a sum of modes D_k [m] with
-coordinates A (states, modes). These are a linear function of u by ridge regression, with lam in mean
-squares of u. So the correction knows the state
-of the coarse run alone, neither time nor parameters: loads may be ones that only the run shows.
+coordinates A (states, modes). These are a linear function of u by ridge regression, with lam in
+mean squares of u. So the correction knows the state of the coarse run alone, neither time nor
+parameters: loads may be ones that only the run shows.
 
 It is a rival of reduced models, of the kind of multi-fidelity methods: M. C. Kennedy and A.
 O'Hagan, "Predicting the output from a complex computer code when fast approximations are
