@@ -1,9 +1,11 @@
 """From which size on a reduced model of the arm is the cheapest: a model of what runs cost, fitted
 to times of steps at three sizes and checked at a larger one, with the errors of `trade.reduced`.
 
-Times are CPU times of one thread, medians of steps of all methods and sizes in turn. That errors
-fall with the size as they do between the three sizes is an extrapolation, of which two runs of the
-larger size are a check. Errors of reduced models do not fall; the smallest is taken.
+Times are CPU times of one thread, medians of steps of all methods and sizes in turn, in memory that
+the process keeps: pages that are cleared anew make steps of many points dearer, and no law of sizes
+would hold. That errors fall with the size as they do between the three sizes is an extrapolation,
+of which coarse runs of the larger size are a check. Errors of reduced models do not fall; the
+smallest is taken.
 """
 
 from typing import NamedTuple
@@ -12,12 +14,13 @@ import numba
 import numpy as np
 
 from mpm_ref.core.jit import set_threads
+from mpm_ref.hot.heap import keep_freed_memory
 from mpm_ref.rom.study.full_model import ldm_full_model
 
 from ..common.registry import experiment
 from ..common.results import RESULTS, ProfileResults
-from .arm import arm, draws, simulated
-from .arm_models import FEW, Training, coarse_method
+from .arm import ENDS, arm, draws, simulated
+from .arm_models import Training, coarse_method
 from .reduced import ERROR, GAIN, GRIDS, SEED, errors
 from .size_model import (
     Rivals,
@@ -29,7 +32,14 @@ from .size_model import (
     fit_step,
     fit_tried,
 )
-from .size_timing import in_turn, median_step, readings, small_models, steppers
+from .size_timing import (
+    carried_models,
+    in_turn,
+    median_step,
+    readings,
+    small_models,
+    steppers,
+)
 
 FITTED = {"quick": (0.03, 0.02), "standard": tuple(GRIDS.values())}     # dx [m]
 CHECK = {"quick": 0.015, "standard": 0.02 / 3.0}
@@ -40,8 +50,8 @@ COUNTS = 16, 2              # of the draws of `trade.reduced`, whose tests are t
 FACTOR, ERROR_FACTOR = 1.3, 1.5     # within which predictions hold; chosen before the measurement
 SIZES = np.geomspace(1e4, 1e9, 501)
 REDUCED = {"pod.few": "pod", "pod.all": "pod", "nsf.few": "nsf", "nsf.all": "nsf"}  # what is read
-STEPS = ("particles", "method", "cpu", "points", "candidates", "predicted", "predicted_points",
-         "fitted")
+STEPS = ("particles", "method", "cpu", "points", "candidates", "samples", "predicted",
+         "predicted_points", "fitted")
 READS = ("particles", "name", "cpu", "predicted", "fitted")
 RUNS = ("method", "error", "predicted_error", "cpu", "predicted")
 GAINS = ("particles", "method", "cpu", "gain", "gain_full")
@@ -76,6 +86,7 @@ class Timed(NamedTuple):
             profiles=("quick", "standard"), budget={"quick": 30, "standard": 400})
 def reduced_size(run):
     """Fit the cost model, compare it with a larger size, and record the sizes that it predicts."""
+    keep_freed_memory()
     threads = numba.get_num_threads()
     set_threads(1)
     try:
@@ -104,13 +115,14 @@ def time_sizes(run, sizes):
     """Return what is `Timed` on grids of these spacings [m]."""
     mu, (test,) = draws(TRAIN, 1, SEED)
     small, rounds = small_models(mu, sizes[0]), run.choose(quick=3, standard=7)
-    steps = {(dx, name): step for dx in run.progress(sizes, "sizes")
-             for name, step in steppers(small, test, dx).items()}
+    models = {dx: carried_models(small, dx) for dx in run.progress(sizes, "sizes")}
+    steps = {(dx, name): step for dx, one in models.items()
+             for name, step in steppers(one, test, dx).items()}
     found = in_turn(steps, rounds, run.progress)
     particles = {dx: int(found[dx, "full.apic"][0].points) for dx in sizes}
     del steps
-    reads = {(dx, name): read for dx in sizes
-             for name, read in readings(small, test, dx, COARSER).items()}
+    reads = {(dx, name): read for dx, one in models.items()
+             for name, read in readings(one, test, dx, COARSER).items()}
     return Timed(particles, {key: median_step(each) for key, each in found.items()},
                  {key: float(np.median(each))
                   for key, each in in_turn(reads, rounds, run.progress).items()})
@@ -121,9 +133,9 @@ def step_costs(timed, fitted):
     N, costs = np.array([timed.particles[dx] for dx in fitted]), {}
     for name in dict.fromkeys(method for _, method in timed.steps):
         steps = [timed.steps[dx, name] for dx in fitted]
-        cpu, points, candidates = map(np.array, zip(*steps, strict=True))
+        cpu, points, candidates, samples = map(np.array, zip(*steps, strict=True))
         if candidates.any():
-            reach = fit_reach(N, points, FEW)
+            reach = fit_reach(N, points, samples.mean())
             costs[name] = fit_step(N, cpu, reach, fit_tried(N, candidates, reach))
         else:
             costs[name] = fit_step(N, cpu)
@@ -183,8 +195,8 @@ def rivals_of(run, timed, steps, reads):
                f"B = {law.B:.3g} m^-p")
     others = {coarse[name]: fit_power(n[method == name], error[method == name])
               for name in dict.fromkeys(method) if name.endswith(".mls")}
-    spacings = list(timed.particles)
-    count = np.mean([arm(np.zeros(6), dx).steps / np.cbrt(timed.particles[dx]) for dx in spacings])
+    middle = np.mean(ENDS, axis=1)
+    count = np.mean([arm(middle, dx).steps / np.cbrt(N) for dx, N in timed.particles.items()])
     volume = np.mean([N * dx**3 for dx, N in timed.particles.items()])
     full, other = (RunCost(steps[f"full.{transfer}"], count) for transfer in ("apic", "mls"))
     return Rivals(full, other, reads["carry.2"], law, others, volume)

@@ -3,7 +3,7 @@ of runs on coarser grids and of reduced models, and from which size on one is ch
 
     run   = steps * step + states * read * N,      steps ~ N^(1/3), by a fixed CFL number
     step  = fixed + point * points + candidate * candidates
-    reach = N (1 - exp(-s K / N)),    K = per_cell^3 width^3 (1 - loss width N^(-1/3))
+    reach = N (1 - exp(-s K / N)),    K = (per_cell width / (1 + loss width N^(-1/3)))^3
 
 A full-order step and one whose samples are all points have points = N and no candidates. Of s
 samples drawn at random, points and candidates are those within windows of `width` cells, that
@@ -22,8 +22,8 @@ from scipy.optimize import minimize_scalar, nnls
 from .arm import LEVELS, PER_CELL
 
 STATES = LEVELS + 1     # whose positions are read
-SHARE = 0.05            # least part of a window within the body
-WIDEST = 30.0           # cells of a window
+WIDEST, LARGEST = 30.0, 5.0     # cells of a window; loss by the surface
+TRIED = 2001            # values that a fit of points tries
 ORDERS = 0.1, 4.0       # between which p is searched
 WIDTH = 5.0             # cells in which points share a node of a quadratic spline with a sample
 
@@ -31,14 +31,13 @@ WIDTH = 5.0             # cells in which points share a node of a quadratic spli
 class Reach(NamedTuple):
     """Points in the windows of samples."""
 
-    samples: int
+    samples: float
     width: float        # [cells]
     loss: float         # by the surface, times N^(1/3), per cell of width
 
     def count(self, N):
         """Return the number of points of N."""
-        inside = np.maximum(SHARE, 1.0 - self.loss * self.width / np.cbrt(N))
-        K = (PER_CELL * self.width) ** 3 * inside
+        K = (PER_CELL * self.width / (1.0 + self.loss * self.width / np.cbrt(N))) ** 3
         return -N * np.expm1(-self.samples * K / N)
 
 
@@ -129,7 +128,7 @@ class Rivals(NamedTuple):
 
 def fit_reach(N, counts, samples):
     """Return the `Reach` of integration points that is nearest to counts (sizes,) of N."""
-    return nearest(N, counts, lambda loss: Reach(samples, WIDTH, loss), (0.0, WIDEST))
+    return nearest(N, counts, lambda loss: Reach(samples, WIDTH, loss), (0.0, LARGEST))
 
 
 def fit_tried(N, counts, reach):
@@ -141,9 +140,8 @@ def fit_tried(N, counts, reach):
 
 def nearest(N, counts, reach, ends):
     """Return reach(y) for the y between the ends that has the least squares of log counts."""
-    def misfit(y):
-        return float(np.sum(np.log(reach(y).count(N) / counts) ** 2))
-    return reach(float(minimize_scalar(misfit, bounds=ends, method="bounded").x))
+    found = [reach(float(y)) for y in np.linspace(*ends, TRIED)]
+    return min(found, key=lambda one: np.sum(np.log(one.count(N) / counts) ** 2))
 
 
 def fit_step(N, cpu, reach=None, tried=None):

@@ -29,7 +29,7 @@ from .arm_models import CORRECTIONS, FEW, MODES, NSF, Training, carrier_of
 from .ldm_cost import TimedCalls
 
 FIELDS = ("x", "F", "tau", "C")
-STATES = 16 * LEVELS    # of the training of a correction, as in `trade.reduced`
+TRAINED_STATES = 16 * LEVELS    # of the training of a correction, as in `trade.reduced`
 
 
 class SmallModels(NamedTuple):
@@ -47,6 +47,7 @@ class Step(NamedTuple):
     cpu: float              # [s]
     points: float           # that carry mass
     candidates: float       # that were tried
+    samples: float
 
 
 def small_models(mu, dx):
@@ -78,11 +79,10 @@ def carried_models(small, dx):
 
 # Steps.
 
-def steppers(small, mu, dx):
+def steppers(models, mu, dx):
     """Return {name of a method: function that makes its next step and returns the `Step`} of an arm
-    with parameters mu (6,) on a grid of spacing dx [m].
+    with parameters mu (6,) on a grid of spacing dx [m]; models: `carried_models` for its points.
     """
-    models = carried_models(small, dx)
     found = {f"full.{transfer}": full_stepper(arm(mu, dx, transfer))
              for transfer in ("apic", "mls")}
     full, own = ldm_full_model(arm(mu, dx)), models.fields.with_parameters(mu)
@@ -104,7 +104,7 @@ def full_stepper(scene):
 
     def step():
         run.step()
-        return Step(run.spent[-1].cpu, n, 0)
+        return Step(run.spent[-1].cpu, n, 0, n)
     return step
 
 
@@ -133,7 +133,7 @@ def reduced_stepper(plan):
         tried.clear()
         start = process_time()
         report = next(states).report
-        return Step(process_time() - start, report.points, sum(tried))
+        return Step(process_time() - start, report.points, sum(tried), report.samples)
     return step
 
 
@@ -158,20 +158,19 @@ def median_step(steps):
 
 # Readings.
 
-def readings(small, mu, dx, coarser):
+def readings(models, mu, dx, coarser):
     """Return {name: function that returns the CPU seconds of a point} of what is read from a state:
     modes of LDM and NSF, and points that go with coarse particles, with a correction and without.
     """
-    models, rng = carried_models(small, dx), np.random.default_rng(0)
-    n = len(models.pod.X)
+    n, rng = len(models.pod.X), np.random.default_rng(0)
     own, numbers, g = models.fields.with_parameters(mu), np.arange(n), numbered(models.pod)
     found = {"pod": lambda: g.place(numbers, np.ones(MODES)),
              "nsf": lambda: own.place(numbers, models.rest)}
     for times in coarser:
-        one = carrier_of(times, Training(dx, small.mu, []))
+        one = carrier_of(times, Training(dx, models.mu, []))
         fit = CoarseCorrection(one, rng.standard_normal((n, 3, CORRECTIONS)),
-                               rng.standard_normal((STATES, one.X_coarse.size)),
-                               rng.standard_normal((STATES, CORRECTIONS)), 0.0)
+                               rng.standard_normal((TRAINED_STATES, one.X_coarse.size)),
+                               rng.standard_normal((TRAINED_STATES, CORRECTIONS)), 0.0)
         found |= {f"carry.{times}": partial(one.place, 1.1 * one.X_coarse),
                   f"corrected.{times}": partial(fit.place, 1.1 * one.X_coarse)}
     return {name: partial(seconds_per_point, call, n) for name, call in found.items()}
