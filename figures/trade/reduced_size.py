@@ -6,7 +6,7 @@ gained over the full-order run within the error (dashed) and over the cheapest r
 
 import matplotlib.pyplot as plt
 
-from ..common.style import legend_below, scales, series
+from ..common.style import legend_below, readable, scales, series
 
 NEEDS = ["trade.reduced-size"]
 GAIN = 5.0
@@ -42,6 +42,7 @@ def steps(ax, table):
         ax.loglog(n[fitted], cpu[fitted], mark, color=color, mfc="w", ms=6)
         ax.loglog(n[~fitted], cpu[~fitted], mark, color=color, ms=6, label=label)
     ax.set(xlabel="particles", ylabel="CPU time of a step [ms]")
+    readable(ax.xaxis, (1.0, 3.0))
 
 
 def gains(ax, table):
