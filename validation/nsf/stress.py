@@ -59,8 +59,7 @@ def compare_stress(run):
     runs in their place; one draw of samples, every second test.
     """
     rows = []
-    for name in run.progress(run.choose(quick=("jelly", FIGURE), standard=tuple(STUDIES)),
-                             "scenes"):
+    for name in run.progress(run.choose(quick=(FIGURE,), standard=tuple(STUDIES)), "scenes"):
         one, model = fit_study(study_of(run, name)), trained(f"{name}-waves")
         networks = one._replace(fields=fields_of(model, one.study), xhat=model.xhat)
         pair = dict(zip(FIELDS, (networks, one), strict=True))

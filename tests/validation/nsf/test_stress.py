@@ -48,9 +48,16 @@ def test_coordinates_are_those_nearest_to_the_positions(one):
     assert stress.nearest_error(trained_run, 0.3) < coordinates
 
 
-def test_steps_half_as_long_end_at_the_same_times(one):
-    finer = stress.refined_error(one, VALUE)
-    assert 0.0 < finer < share(one.runs.tau[1].astype(float), one.tests[VALUE].tau[0].astype(float))
+def test_steps_half_as_long_end_at_the_same_times(one, monkeypatch):
+    simulated, scene = [], one.study.run(VALUE)
+
+    def simulate(scene, mu, kind, every):
+        simulated.append((scene.dt, scene.steps, every))
+        return one.tests[VALUE]
+
+    monkeypatch.setattr(stress, "simulate_history", simulate)
+    assert stress.refined_error(one, VALUE) == 0.0
+    assert simulated == [(0.5 * scene.dt, 2 * scene.steps, 2 * one.study.spacing)]
 
 
 def test_runs_are_judged_beside_training_runs(one):
