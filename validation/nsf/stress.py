@@ -7,6 +7,7 @@ error has these parts, each measured alone:
 
     projection      of the full run's own stress on the modes: no coefficients are nearer
     coordinates     of the fields at the latent coordinates nearest to the full run's positions
+    unsmoothed      likewise, of modes whose coefficients go through those of all snapshots
     all             of the run with all particles as samples
     samples         of the run with the study's samples
 
@@ -29,10 +30,11 @@ from ..common.registry import experiment
 from ..common.rivals import INTERPOLATED, NEAREST, weighted_sum
 from ..common.scenes import with_
 from .networks import fields_of, trained
-from .reduced_runs import fit_study
+from .reduced_runs import fit_study, refit
 from .rivals import STUDIES, study_of
 from .states import history_points, run_points
 
+SHARP = 1e-8            # smoothing of the coefficients that counts as none
 EVERY = 2               # of the tests of a scene
 FIGURE = "metal"        # scene of Figure 9
 SHADE = 0.1             # of the range of colours
@@ -46,6 +48,7 @@ PARTS = {
     INTERPOLATED: "the interpolation of two training runs",
     "projection": "the full run's stress on the modes, which no coefficients come nearer to",
     "coordinates": "the fields at the coordinates nearest to the full run's positions",
+    "unsmoothed": "likewise, of modes whose coefficients are not smoothed",
     "samples": "reduced runs on the study's samples",
     "all": "reduced runs on all particles",
     "refined": "of the full run, by one of steps half as long"}
@@ -118,10 +121,12 @@ def colour_error(one, value):
 def scene_rows(pair):
     """Yield rows of COLUMNS without the scene, of {fields: `FittedStudy`} on the same runs."""
     one = pair["modes"]
+    sharp = refit(one, one.study.sizes._replace(smoothing=SHARP), one.study.follows)
     for value in one.study.test[::EVERY]:
         for lookup, tau in lookup_stresses(one.runs, value).items():
             yield value, TRAINING, lookup, history_error(tau, one.tests[value].tau[0])
         yield value, "modes", "projection", projection_error(one, value)
+        yield value, "modes", "unsmoothed", nearest_error(sharp, value)
         yield value, "modes", "all", one.errors(value, len(one.runs.X)).stress
         for fields, own in pair.items():
             yield value, fields, "coordinates", nearest_error(own, value)
