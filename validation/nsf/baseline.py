@@ -62,7 +62,7 @@ class NumberedDecoder(NamedTuple):
         return self.g.velocity(self.X[points], xhat, vhat)
 
 
-class LdmStudy(NamedTuple):
+class LdmBaseline(NamedTuple):
     """LDM on a trained network of the position, in the tests of a study."""
 
     study: NsfStudy
@@ -118,7 +118,7 @@ def record_scene(run, name, one, model):
     """Record the errors of a scene's models; return their rows. one: `FittedStudy`; model: of the
     trained networks.
     """
-    studies = {"ldm": LdmStudy(one.study, one.tests, model),
+    studies = {"ldm": LdmBaseline(one.study, one.tests, model),
                "nsf": one._replace(fields=fields_of(model, one.study), xhat=model.xhat),
                "modes": one._replace(map_alone=True)}
     count = one.study.samples
