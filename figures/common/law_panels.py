@@ -10,7 +10,7 @@ from .bodies import Panel, failure_note, no_balls, pictures, shades
 from .state_panels import cloud, spacing
 
 TITLES = {"start": "start", "true": "truth", "ours": "ours", "neural": "neural", "gnn": "gnn",
-          "longer": "longer", "admissible": "admissible", "init": "before\ntraining"}
+          "admissible": "admissible", "init": "before\ntraining"}
 HEIGHT = "height at the start, over that of the body"
 
 

@@ -118,15 +118,14 @@ def test_runs_beside_the_truth_are_drawn_as_far_as_trained(tmp_path, short, monk
     water = with_(reconstruction("water"), steps=10)
     monkeypatch.setattr(other_bodies, "contact", lambda points: water)
     monkeypatch.setattr(other_bodies, "large", lambda _: with_(reconstruction("sand"), steps=10))
-    for name in ("trained", "longer_laws"):
-        monkeypatch.setattr(other_bodies, name, lambda name: name)
+    monkeypatch.setattr(other_bodies, "trained", lambda name: name)
     monkeypatch.setattr(other_bodies, "body_maker", lambda name: other_bodies.copy_body
                         if name.startswith("water") else untrained_yet(name))
     results = done(tmp_path, other_bodies.many)
-    assert results.value("nclaw.fig3", "nclaw.fig3.toys.longer") == 0.0
+    assert results.value("nclaw.fig3", "nclaw.fig3.toys.ours") == 0.0
     assert "no weights sand" in str(results.records("nclaw.fig3"))
     shown = [ax for ax in fig03.draw(results).axes if ax.images]
-    assert [ax.get_title() for ax in shown] == ["start", "ours", "longer", "admissible", "truth"]
+    assert [ax.get_title() for ax in shown] == ["start", "ours", "admissible", "truth"]
 
 
 def test_bodies_that_share_a_grid_are_recorded_each(tmp_path, monkeypatch):
@@ -138,7 +137,8 @@ def test_bodies_that_share_a_grid_are_recorded_each(tmp_path, monkeypatch):
     monkeypatch.setattr(other_bodies, "trained", lambda name: name)
     monkeypatch.setattr(other_bodies, "body_maker", lambda name: other_bodies.copy_body
                         if "admissible" in name
-                        else lambda body: body_with_laws(body, FixedCorotated(1e15, 1e15), NoFlow()))
+                        else lambda body: body_with_laws(
+                            body, FixedCorotated(1e15, 1e15), NoFlow()))
     results = done(tmp_path, other_bodies.company)
     found = {r.target: r for r in results.records("nclaw.fig4")}
     for target in ("pool.admissible", "pool.admissible.duck", "pool.admissible.pool",

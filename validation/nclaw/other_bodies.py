@@ -21,7 +21,6 @@ from ..common.weights_needed import Untrained
 from ..ldm.published_bodies import keep
 from .environments import ENVIRONMENTS, environment
 from .gallery import CORNERS, DESSERT, TOY_POINTS, contact, dessert, halved, large, pool
-from .longer_horizons import LONGER, longer_laws
 from .melting import melting
 from .stand_in_bodies import body_label
 from .states import BROKEN, DISTANCE, collect, shots
@@ -31,14 +30,13 @@ from .trained_laws import trained, weights_of
 EACH = 4000         # kept points of a run, at most
 ENVIRONMENT_OF = {(FixedCorotated, None): "jelly", (Hencky, DruckerPrager): "sand",
                   (Hencky, VonMises): "plasticine", (Fluid, None): "water"}
-METHODS = ("ours", "admissible")    # compared with the true laws; see `laws_of`
-LONG_METHODS = ("ours", LONGER, "admissible")       # of the dragon and the toys
+METHODS = ("ours", "admissible")    # compared with the true laws; of `trained_laws.weights_of`
 BASELINE_METHODS = ("ours", "neural", "admissible")     # of task (c)
 FEW, SHORT = 1000, 550              # points and steps of the slope, quick: until the floor
-FEW_ON_SLOPE = 3000                 # points, standard: about thirty per cell
-FEW_IN_TOY = 1500                   # points of each toy, standard
-SPARSE = 0.01                       # [m], between points of the dragon, standard; before `halved`
-SHORT_POOL = 2000                   # steps, standard: until the duck rises
+FEW_ON_SLOPE = 1500                 # points, standard: about fifteen per cell
+FEW_IN_TOY = 1000                   # points of each toy, standard
+SPARSE = 0.0115                     # [m], between points of the dragon, standard; before `halved`
+SHORT_POOL = 1500                   # steps, standard
 MELTS = ("plasticine", "sand")      # before and after
 
 
@@ -50,8 +48,8 @@ def many(run):
     """
     dragon = large() if run.profile == "paper" else halved(large(SPARSE))
     toys = contact(run.choose(standard=FEW_IN_TOY, paper=TOY_POINTS))
-    show(run, {"toys": (partial(both, toys, LONG_METHODS), labels(CORNERS)),
-               "dragon": (partial(both, dragon, LONG_METHODS), body_label("dragon"))})
+    show(run, {"toys": (partial(both, toys), labels(CORNERS)),
+               "dragon": (partial(both, dragon), body_label("dragon"))})
 
 
 @experiment("nclaw.fig4", title="NCLaw: a duck on water, and ice cream that melts",
@@ -128,7 +126,8 @@ def both(scene, methods=METHODS):
     """Return the `thinned` runs of a scene with true laws and with methods. Raises `Untrained`."""
     ends = with_(scene, every=scene.steps)
     names = {environment_of(body) for body in build(scene).bodies}
-    laws = {word: {name: body_maker(laws_of(word, name)) for name in names} for word in methods}
+    laws = {word: {name: body_maker(trained(weights_of(word, name))) for name in names}
+            for word in methods}
     runs = {"true": shots(ends, copy_body)}
     for word, mine in laws.items():
         runs[word] = shots(ends, lambda body, mine=mine: mine[environment_of(body)](body))
@@ -139,15 +138,11 @@ def melted(scene):
     """Return the `thinned` runs of a scene whose plasticine becomes sand. Raises `Untrained`."""
     ends = with_(scene, every=scene.steps)
     laws = {"true": [partial(with_laws_of, build(environment(name)).bodies[0]) for name in MELTS],
-            **{word: [body_maker(laws_of(word, name)) for name in MELTS] for word in METHODS}}
+            **{word: [body_maker(trained(weights_of(word, name))) for name in MELTS]
+               for word in METHODS}}
     with threads_for(build(scene).bodies):
         runs = {word: collect(melting(build(ends), *pair), 2) for word, pair in laws.items()}
     return thinned(runs, scene)
-
-
-def laws_of(word, name):
-    """Return the `LearnedLaws` of a method on an environment. Raises `Untrained`."""
-    return longer_laws(f"{name}-{LONGER}") if word == LONGER else trained(weights_of(word, name))
 
 
 def thinned(runs, scene):
