@@ -15,7 +15,7 @@ from ..common.law_panels import (
 from ..common.style import scales
 
 NEEDS = ["nclaw.fig3"]
-ROWS = {"dragon": "a dragon of water", "toys": "four toys of jelly"}
+ROWS = {"dragon": "a dragon of water", "contact": "four toys of jelly"}
 
 
 def scale(results):

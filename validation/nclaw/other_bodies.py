@@ -48,7 +48,7 @@ def many(run):
     """
     dragon = large() if run.profile == "paper" else halved(large(SPARSE))
     toys = contact(run.choose(standard=FEW_IN_TOY, paper=TOY_POINTS))
-    show(run, {"toys": (partial(both, toys), labels(CORNERS)),
+    show(run, {"contact": (partial(both, toys), labels(CORNERS)),
                "dragon": (partial(both, dragon), body_label("dragon"))})
 
 
