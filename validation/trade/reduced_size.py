@@ -23,14 +23,14 @@ from .arm import ENDS, arm, draws, simulated
 from .arm_models import Training, coarse_method
 from .reduced import ERROR, GAIN, GRIDS, SEED, errors
 from .size_model import (
+    ArmRunCost,
     Rivals,
-    RunCost,
     first_size,
     fit_grid_error,
     fit_power,
-    fit_reach,
     fit_step,
     fit_tried,
+    fit_windows,
 )
 from .size_timing import (
     carried_models,
@@ -75,7 +75,7 @@ class SizeNeeded(NamedTuple):
 
 
 class Timed(NamedTuple):
-    """What was timed: names and sizes of `Step`s, and seconds per point of what is read."""
+    """Median times of steps, and of what is read, at several sizes."""
 
     particles: dict         # {dx: N}
     steps: dict             # {(dx, method): `Step`}
@@ -135,8 +135,8 @@ def step_costs(timed, fitted):
         steps = [timed.steps[dx, name] for dx in fitted]
         cpu, points, candidates, samples = map(np.array, zip(*steps, strict=True))
         if candidates.any():
-            reach = fit_reach(N, points, samples.mean())
-            costs[name] = fit_step(N, cpu, reach, fit_tried(N, candidates, reach))
+            windows = fit_windows(N, points, samples.mean())
+            costs[name] = fit_step(N, cpu, windows, fit_tried(N, candidates, windows))
         else:
             costs[name] = fit_step(N, cpu)
     return costs
@@ -153,10 +153,10 @@ def record_steps(run, timed, costs, check):
     rows = []
     for (dx, name), step in timed.steps.items():
         N, cost = float(timed.particles[dx]), costs[name]
-        points = float(cost.reach.count(N)) if cost.reach else N
+        points = float(cost.windows.count(N)) if cost.windows else N
         rows.append((int(N), name, *step, float(cost.seconds(N)), points, int(dx != check)))
         if dx == check:
-            record_step(run, rows[-1], bool(cost.reach))
+            record_step(run, rows[-1], bool(cost.windows))
     run.table("steps", STEPS, rows)
 
 
@@ -198,7 +198,7 @@ def rivals_of(run, timed, steps, reads):
     middle = np.mean(ENDS, axis=1)
     count = np.mean([arm(middle, dx).steps / np.cbrt(N) for dx, N in timed.particles.items()])
     volume = np.mean([N * dx**3 for dx, N in timed.particles.items()])
-    full, other = (RunCost(steps[f"full.{transfer}"], count) for transfer in ("apic", "mls"))
+    full, other = (ArmRunCost(steps[f"full.{transfer}"], count) for transfer in ("apic", "mls"))
     return Rivals(full, other, reads["carry.2"], law, others, volume)
 
 
@@ -213,8 +213,8 @@ def record_whole_runs(run, rivals, check):
     for times, transfer in run.progress(WHOLE, "coarse runs"):
         method = coarse_method(times, Training(check, tests, []), transfer)
         found = [method.positions(mu) for mu in tests]
-        cost, law = ((rivals.full, rivals.error.of(times, check)) if transfer == "apic" else
-                     (rivals.other, rivals.others[times].of(N)))
+        cost, law = ((rivals.full, rivals.error.value(times, check)) if transfer == "apic" else
+                     (rivals.other, rivals.others[times].value(N)))
         rows.append((method.name, errors(X, found, full)[0], float(law),
                      float(np.mean([one.cpu for one in found])),
                      float(rivals.coarse(cost, times).seconds(N))))
@@ -234,10 +234,10 @@ def record_whole_runs(run, rivals, check):
 # Sizes.
 
 def run_costs(rivals, steps, reads):
-    """Return {method: `RunCost`} of what is learned."""
-    found = {name: RunCost(steps[name], rivals.full.steps, reads[read])
+    """Return {method: `ArmRunCost`} of what is learned."""
+    found = {name: ArmRunCost(steps[name], rivals.full.steps, reads[read])
              for name, read in REDUCED.items()}
-    return found | {f"corrected.{times}": RunCost(rivals.other.step, rivals.other.steps,
+    return found | {f"corrected.{times}": ArmRunCost(rivals.other.step, rivals.other.steps,
                                                   reads[f"corrected.{times}"], times)
                     for times in COARSER}
 
@@ -263,7 +263,7 @@ def record_sizes(run, rivals, costs):
 
 
 def size_needed(method, error, rivals, cost):
-    """Return the `SizeNeeded` of a method with an error and a `RunCost`."""
+    """Return the `SizeNeeded` of a method with an error and a `ArmRunCost`."""
     seconds = cost.seconds(SIZES)
     full, best = (rivals.cheapest(SIZES, error, any_grid) / seconds for any_grid in (False, True))
     bare = (rivals._replace(carry=0.0).cheapest(SIZES, error)

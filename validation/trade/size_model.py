@@ -1,9 +1,9 @@
 """CPU time of a run of the arm as a function of the number of its particles N, of the full model,
 of runs on coarser grids and of reduced models, and from which size on one is cheaper.
 
-    run   = steps * step + states * read * N,      steps ~ N^(1/3), by a fixed CFL number
-    step  = fixed + point * points + candidate * candidates
-    reach = N (1 - exp(-s K / N)),    K = (per_cell width / (1 + loss width N^(-1/3)))^3
+    run    = steps * step + states * read * N,      steps ~ N^(1/3), by a fixed CFL number
+    step   = fixed + point * points + candidate * candidates
+    points = N (1 - exp(-s K / N)),    K = (per_cell width / (1 + loss width N^(-1/3)))^3
 
 A full-order step and one whose samples are all points have points = N and no candidates. Of s
 samples drawn at random, points and candidates are those within windows of `width` cells, that
@@ -28,7 +28,7 @@ ORDERS = 0.1, 4.0       # between which p is searched
 WIDTH = 5.0             # cells in which points share a node of a quadratic spline with a sample
 
 
-class Reach(NamedTuple):
+class Windows(NamedTuple):
     """Points in the windows of samples."""
 
     samples: float
@@ -47,17 +47,17 @@ class StepCost(NamedTuple):
     fixed: float        # [s]
     point: float        # [s] of an integration point
     candidate: float    # [s] of a point that is tried as one
-    reach: Reach | None = None      # None: all points count
-    tried: Reach | None = None
+    windows: Windows | None = None      # None: all points count
+    tried: Windows | None = None
 
     def seconds(self, N):
         """Return the CPU seconds of a step with N particles."""
-        points = self.reach.count(N) if self.reach else N
+        points = self.windows.count(N) if self.windows else N
         candidates = self.tried.count(N) if self.tried else 0.0 * N
         return self.fixed + self.point * points + self.candidate * candidates
 
 
-class RunCost(NamedTuple):
+class ArmRunCost(NamedTuple):
     """CPU time of a run: its steps, on a grid `coarser` times as coarse, and what it reads."""
 
     step: StepCost
@@ -77,7 +77,7 @@ class GridError(NamedTuple):
     B: float
     p: float
 
-    def of(self, c, dx):
+    def value(self, c, dx):
         """Return the error of a run on a grid c times as coarse as dx [m]."""
         return self.B * dx**self.p * (c**self.p - 1.0)
 
@@ -87,21 +87,21 @@ class GridError(NamedTuple):
 
 
 class PowerLaw(NamedTuple):
-    """a N^b."""
+    """A power law a N^b."""
 
     a: float
     b: float
 
-    def of(self, N):
+    def value(self, N):
         """Return the value for N."""
         return self.a * N**self.b
 
 
 class Rivals(NamedTuple):
-    """What a reduced model is compared with."""
+    """Full-order runs, on any grid, that a reduced model is compared with."""
 
-    full: RunCost               # of the transfer that errors are compared with
-    other: RunCost              # of the faster transfer
+    full: ArmRunCost               # of the transfer that errors are compared with
+    other: ArmRunCost              # of the faster transfer
     carry: float                # [s] of a fine point that goes with coarse particles
     error: GridError            # of runs on any coarser grid by the transfer of `full`
     others: dict                # {times as coarse: `PowerLaw` of the error} by the other transfer
@@ -112,7 +112,7 @@ class Rivals(NamedTuple):
         found = [self.full.seconds(N)]
         for c, law in self.others.items():
             if c == 1.0 or can_coarsen:
-                found.append(np.where(law.of(N) <= error, self.coarse(self.other, c).seconds(N),
+                found.append(np.where(law.value(N) <= error, self.coarse(self.other, c).seconds(N),
                                       np.inf))
         if can_coarsen:
             c = self.error.coarsest(error, np.cbrt(self.volume / N))
@@ -120,40 +120,40 @@ class Rivals(NamedTuple):
         return np.min(found, axis=0)
 
     def coarse(self, run, c):
-        """Return the `RunCost` of a run on a grid c times as coarse."""
+        """Return the `ArmRunCost` of a run on a grid c times as coarse."""
         return run._replace(coarser=c, read=np.where(np.equal(c, 1.0), 0.0, self.carry))
 
 
 # Fits.
 
-def fit_reach(N, counts, samples):
-    """Return the `Reach` of integration points that is nearest to counts (sizes,) of N."""
-    return nearest(N, counts, lambda loss: Reach(samples, WIDTH, loss), (0.0, LARGEST))
+def fit_windows(N, counts, samples):
+    """Return the `Windows` of integration points that are nearest to counts (sizes,) of N."""
+    return nearest(N, counts, lambda loss: Windows(samples, WIDTH, loss), (0.0, LARGEST))
 
 
-def fit_tried(N, counts, reach):
-    """Return the `Reach` of candidates that is nearest to counts (sizes,) of N, whose windows lose
-    to the surface as those of `reach`.
+def fit_tried(N, counts, windows):
+    """Return the `Windows` of candidates that are nearest to counts (sizes,) of N, and lose to the
+    surface as those of the integration points.
     """
-    return nearest(N, counts, lambda width: reach._replace(width=width), (WIDTH, WIDEST))
+    return nearest(N, counts, lambda width: windows._replace(width=width), (WIDTH, WIDEST))
 
 
-def nearest(N, counts, reach, ends):
-    """Return reach(y) for the y between the ends that has the least squares of log counts."""
-    found = [reach(float(y)) for y in np.linspace(*ends, TRIED)]
+def nearest(N, counts, make, ends):
+    """Return the `Windows` make(y) with the least squares of log counts, y between the ends."""
+    found = [make(float(y)) for y in np.linspace(*ends, TRIED)]
     return min(found, key=lambda one: np.sum(np.log(one.count(N) / counts) ** 2))
 
 
-def fit_step(N, cpu, reach=None, tried=None):
+def fit_step(N, cpu, windows=None, tried=None):
     """Return the `StepCost` with the least squares of relative misfits to cpu (sizes,) [s]; no part
     is negative.
     """
-    points = reach.count(N) if reach else N
+    points = windows.count(N) if windows else N
     parts = [np.ones(len(N)), points, *([tried.count(N)] if tried else [])]
     scale = np.max(parts, axis=1)
     found, _ = nnls(np.transpose(parts) / cpu[:, None] / scale * cpu.mean(), np.ones(len(N)))
     costs = found / scale * cpu.mean()
-    return StepCost(*costs, *([] if tried else [0.0]), reach, tried)
+    return StepCost(*costs, *([] if tried else [0.0]), windows, tried)
 
 
 def fit_grid_error(c, dx, errors):

@@ -9,18 +9,18 @@ from validation.trade.arm import draws
 from validation.trade.reduced_size import size_needed
 from validation.trade.size_model import (
     STATES,
+    ArmRunCost,
     GridError,
     PowerLaw,
-    Reach,
     Rivals,
-    RunCost,
     StepCost,
+    Windows,
     first_size,
     fit_grid_error,
     fit_power,
-    fit_reach,
     fit_step,
     fit_tried,
+    fit_windows,
 )
 from validation.trade.size_timing import carried_models, small_models, steppers
 
@@ -29,34 +29,34 @@ FULL = StepCost(0.0, 2e-7, 0.0)
 
 
 def rivals(**changes):
-    full = RunCost(FULL, 5.0)
+    full = ArmRunCost(FULL, 5.0)
     return Rivals(full, full, 0.0, GridError(0.8, 1.0), {}, 0.1)._replace(**changes)
 
 
 def test_windows_of_samples_do_not_count_a_point_twice():
-    reach = Reach(50, 5.0, 0.75)
-    assert reach.count(1e12) == pytest.approx(50 * 1000, rel=2e-3)
-    assert reach.count(2e3) == pytest.approx(2e3, rel=1e-3)
-    assert (np.diff(reach.count(N)) > 0.0).all()
+    windows = Windows(50, 5.0, 0.75)
+    assert windows.count(1e12) == pytest.approx(50 * 1000, rel=2e-3)
+    assert windows.count(2e3) == pytest.approx(2e3, rel=1e-3)
+    assert (np.diff(windows.count(N)) > 0.0).all()
 
 
 def test_reaches_are_fitted_to_counts():
-    points, tried = Reach(50, 5.0, 0.7), Reach(50, 9.0, 0.7)
-    found = fit_reach(N, points.count(N), 50)
+    points, tried = Windows(50, 5.0, 0.7), Windows(50, 9.0, 0.7)
+    found = fit_windows(N, points.count(N), 50)
     assert found.loss == pytest.approx(0.7, abs=0.01)
     assert fit_tried(N, tried.count(N), found).width == pytest.approx(9.0, abs=0.05)
 
 
 def test_costs_are_fitted_to_times():
-    reach, tried = Reach(50, 5.0, 0.7), Reach(50, 9.0, 0.7)
-    expected = StepCost(1e-3, 2e-6, 1e-6, reach, tried)
-    assert fit_step(N, expected.seconds(N), reach, tried)[:3] == pytest.approx(expected[:3])
+    windows, tried = Windows(50, 5.0, 0.7), Windows(50, 9.0, 0.7)
+    expected = StepCost(1e-3, 2e-6, 1e-6, windows, tried)
+    assert fit_step(N, expected.seconds(N), windows, tried)[:3] == pytest.approx(expected[:3])
     assert fit_step(N, FULL.seconds(N))[:3] == pytest.approx(FULL[:3], abs=1e-12)
 
 
 def test_a_run_on_a_coarser_grid_has_fewer_and_longer_steps():
     """Without anything read: c^3 fewer particles and c fewer steps."""
-    run = RunCost(FULL, 5.0)
+    run = ArmRunCost(FULL, 5.0)
     assert run.seconds(8e4) == pytest.approx(16.0 * run._replace(coarser=2.0).seconds(8e4))
     assert run._replace(read=1e-6).seconds(1e5) - run.seconds(1e5) == pytest.approx(STATES * 0.1)
 
@@ -64,11 +64,11 @@ def test_a_run_on_a_coarser_grid_has_fewer_and_longer_steps():
 def test_errors_of_coarser_grids_are_fitted_and_inverted():
     law = GridError(0.8, 0.9)
     c, dx = np.meshgrid([1.25, 2.0, 4.0], [0.02, 0.01])
-    found, left = fit_grid_error(c.ravel(), dx.ravel(), law.of(c, dx).ravel())
+    found, left = fit_grid_error(c.ravel(), dx.ravel(), law.value(c, dx).ravel())
     assert found == pytest.approx(law, rel=1e-4)
     assert left < 1e-4
-    assert law.coarsest(law.of(3.0, 0.01), 0.01) == pytest.approx(3.0)
-    assert fit_power(N, PowerLaw(2.0, -0.3).of(N)) == pytest.approx((2.0, -0.3))
+    assert law.coarsest(law.value(3.0, 0.01), 0.01) == pytest.approx(3.0)
+    assert fit_power(N, PowerLaw(2.0, -0.3).value(N)) == pytest.approx((2.0, -0.3))
 
 
 def test_the_first_size_is_the_one_from_which_on_a_gain_stays():
@@ -87,7 +87,7 @@ def test_the_cheapest_rival_is_the_coarsest_grid_within_the_error():
 
 def test_a_constant_step_is_cheaper_than_the_full_run_but_not_than_a_coarse_one():
     """A step of 0.1 s costs as much as 5e5 particles; the coarse run's steps do not grow at all."""
-    model = RunCost(StepCost(0.1, 0.0, 0.0), 5.0)
+    model = ArmRunCost(StepCost(0.1, 0.0, 0.0), 5.0)
     found = size_needed("pod.few", 0.05, rivals(), model)
     assert found.equal_full == pytest.approx(5e5, rel=0.03)
     assert found.gain_full == pytest.approx(2.5e6, rel=0.03)
