@@ -1,11 +1,17 @@
 """NCLaw, Figure 4 (a) and (b): a duck of jelly on water, and ice cream of plasticine that becomes
-sand; from left to right the start, ours at the end, the truth there.
+sand; from left to right the start, and at the end ours, laws that thermodynamics admits, the truth.
 """
 
 from validation.ldm.published_bodies import read
+from validation.nclaw.other_bodies import METHODS
 
 from ..common.bodies import View
-from ..common.law_panels import comparison_rows, pictures_by_height, with_end_times
+from ..common.law_panels import (
+    available,
+    comparison_rows,
+    pictures_by_height,
+    with_end_times,
+)
 from ..common.style import scales
 
 NEEDS = ["nclaw.fig4"]
@@ -17,5 +23,6 @@ def scale(results):
 
 
 def draw(results):
-    rows = with_end_times(results, NEEDS[0], ROWS)
-    return pictures_by_height(comparison_rows(read(results.folder, NEEDS[0]), rows), View(3))
+    states, rows = read(results.folder, NEEDS[0]), with_end_times(results, NEEDS[0], ROWS)
+    words = available(states, ROWS, METHODS)
+    return pictures_by_height(comparison_rows(states, rows, words), View(2 + len(words)))

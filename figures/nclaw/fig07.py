@@ -1,8 +1,9 @@
 """NCLaw, Figures 2 (c), 7 and 8: bodies of task (c); from left to right the start, ours half-way,
-the baseline "neural" there, if it was stored, and the truth.
+the baseline "neural" and laws that thermodynamics admits there, if stored, and the truth.
 """
 
 from validation.ldm.published_bodies import read
+from validation.nclaw.other_bodies import BASELINE_METHODS
 
 from ..common.bodies import View
 from ..common.law_panels import (
@@ -23,6 +24,6 @@ def scale(results):
 
 def draw(results):
     states = read(results.folder, NEEDS[0])
-    words = available(states, ROWS, ("ours", "neural"))
+    words = available(states, ROWS, BASELINE_METHODS)
     rows = with_end_times(results, NEEDS[0], ROWS)
     return pictures_by_height(comparison_rows(states, rows, words), View(2 + len(words)))

@@ -1,5 +1,6 @@
 """NCLaw's figures, and what their experiments keep for them."""
 
+import re
 from types import SimpleNamespace
 
 import matplotlib as mpl
@@ -8,15 +9,16 @@ import pytest
 
 from figures.common.bodies import View, pictures
 from figures.common.law_panels import comparison_rows
-from figures.nclaw import fig02, fig03, fig06, fig07, table5
-from mpm_ref.materials import Fluid, NoFlow
+from figures.nclaw import fig02, fig03, fig04, fig06, fig07, table5
+from mpm_ref.materials import FixedCorotated, Fluid, NoFlow
 from mpm_ref.nclaw.gnn.simulator import Simulator
+from mpm_ref.nclaw.study.compare import RunBroken
 from validation.common import targets
 from validation.common.results import RESULTS, ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained
-from validation.nclaw import other_bodies, states
+from validation.nclaw import gallery, other_bodies, states
 from validation.nclaw.evaluate import body_with_laws
 from validation.nclaw.tasks import reconstruction
 
@@ -40,7 +42,8 @@ def short(monkeypatch):
 
 
 def done(folder, experiment, profile="standard"):
-    assert run_all([experiment.experiment], RunSetting(profile, folder)) == []
+    setting = RunSetting(profile, folder, targets=targets.load())   # refuses ids that are printed
+    assert run_all([experiment.experiment], setting) == []
     return ProfileResults(folder)
 
 
@@ -114,22 +117,46 @@ def test_runs_beside_the_truth_are_drawn_as_far_as_trained(tmp_path, short, monk
         raise Untrained(f"no weights {name}")
 
     water = with_(reconstruction("water"), steps=10)
-    monkeypatch.setattr(other_bodies, "contact", lambda: water)
-    monkeypatch.setattr(other_bodies, "large", lambda: with_(reconstruction("sand"), steps=10))
+    monkeypatch.setattr(other_bodies, "contact", lambda points: water)
+    monkeypatch.setattr(other_bodies, "large", lambda _: with_(reconstruction("sand"), steps=10))
     monkeypatch.setattr(other_bodies, "trained", lambda name: name)
     monkeypatch.setattr(other_bodies, "body_maker", lambda name: other_bodies.copy_body
-                        if name == "water" else untrained_yet(name))
+                        if name.startswith("water") else untrained_yet(name))
     results = done(tmp_path, other_bodies.many)
-    assert results.value("nclaw.fig3", "nclaw.fig3.toys.ours") == 0.0
+    assert results.value("nclaw.fig3", "nclaw.fig3.contact.ours") == 0.0
     assert "no weights sand" in str(results.records("nclaw.fig3"))
     shown = [ax for ax in fig03.draw(results).axes if ax.images]
-    assert [ax.get_title() for ax in shown] == ["start", "ours", "truth"]
+    assert [ax.get_title() for ax in shown] == ["start", "ours", "admissible", "truth"]
+
+
+def test_bodies_that_share_a_grid_are_recorded_each(tmp_path, monkeypatch):
+    """And a law that breaks down with the step in which it does."""
+    monkeypatch.setattr(other_bodies, "pool", lambda: with_(gallery.pool(), every=20))
+    monkeypatch.setattr(other_bodies, "SHORT_POOL", 20)
+    monkeypatch.setattr(other_bodies, "dessert",
+                        lambda: with_(gallery.dessert(), steps=20, every=20))
+    monkeypatch.setattr(other_bodies, "trained", lambda name: name)
+    monkeypatch.setattr(other_bodies, "body_maker", lambda name: other_bodies.copy_body
+                        if "admissible" in name
+                        else lambda body: body_with_laws(
+                            body, FixedCorotated(1e15, 1e15), NoFlow()))
+    results = done(tmp_path, other_bodies.company)
+    found = {r.target: r for r in results.records("nclaw.fig4")}
+    for target in ("pool.admissible", "pool.admissible.duck", "pool.admissible.pool",
+                   "melting.admissible.icecream", "melting.admissible.chocolate"):
+        assert np.isfinite(found[f"nclaw.fig4.{target}"].value)
+    assert found["nclaw.fig4.pool.admissible.duck"].value == 0.0
+    assert found["nclaw.fig4.pool.admissible.duck"].scale.startswith("1011 particles of duck, 20")
+    assert re.search(r"ours: step \d+", found["nclaw.fig4.pool.ours"].note)
+    shown = [ax for ax in fig04.draw(results).axes if ax.images]
+    assert [ax.get_title() for ax in shown[:4]] == ["start", "ours", "admissible", "truth"]
 
 
 def test_states_of_a_run_that_breaks_down_are_missing():
     scene = with_(reconstruction("water"), steps=100, every=5)
-    x = states.shots(scene, lambda body: body_with_laws(body, Fluid(1e15), NoFlow()))
+    x, end = states.shots(scene, lambda body: body_with_laws(body, Fluid(1e15), NoFlow()))
     assert x.shape == (21, 1000, 3)
+    assert 0 < end.step < 100
     assert np.isfinite(x[0]).all()
     assert np.isnan(x[-1]).all()
 
@@ -168,13 +195,15 @@ def test_bodies_of_task_c_are_run_with_baselines(tmp_path, monkeypatch):
     monkeypatch.setattr(other_bodies, "body_maker", lambda name: other_bodies.copy_body
                         if name == "water" else
                         lambda body: body_with_laws(body, Fluid(0.0), NoFlow()))
+    monkeypatch.setattr(other_bodies, "with_points", lambda scene, count: scene)
     results = done(tmp_path, other_bodies.bodies)
     found = {r.target: r for r in results.records("nclaw.fig7")}
     assert found["nclaw.fig7.water.ours"].value == 0.0
     assert 0.0 < found["nclaw.fig7.water.neural"].value < 1.0
     assert "middles are 0 m apart" in found["nclaw.fig7.water.ours"].note
     shown = [ax for ax in fig07.draw(results).axes if ax.images]
-    assert [ax.get_title() for ax in shown] == ["start", "ours", "neural", "truth"]
+    assert [ax.get_title() for ax in shown] == [
+        "start", "ours", "neural", "admissible", "truth"]
     assert shown[0].texts[0].get_text() == "water\nt = 0.005 s"      # half of the steps
 
 
@@ -187,9 +216,13 @@ def test_runs_that_broke_down_are_told(tmp_path):
     x = np.zeros((2, 5, 3))
     runs = {"true": x, "ours": x, "init": np.full_like(x, np.nan)}
     states.record(run, "s", {word: own[-1] for word, own in runs.items()}, 10)
-    other_bodies.show(run, {"a": (lambda: other_bodies.thinned(runs, 10), "five points")})
-    assert [target for target, note in notes.items() if note == states.BROKEN] == [
+    kept = {word: states.Shots(x, RunBroken(7, "gone") if word == "init" else None)
+            for word, x in runs.items()}
+    other_bodies.show(run, {"a": (lambda: other_bodies.thinned(kept, reconstruction("water")),
+                                  "five points")})
+    assert [target for target, note in notes.items() if note.startswith(states.BROKEN)] == [
         "s.init", "e.a.init"]
+    assert notes["e.a.init"] == f"{states.BROKEN}; init: step 7: gone"
     assert len(notes) == 4
 
 

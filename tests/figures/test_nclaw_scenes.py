@@ -59,6 +59,7 @@ def test_the_slope_is_run_with_true_laws_ours_and_admissible_ones(tmp_path, monk
     assert found["nclaw.slope.water.admissible"].value == 0.0
     assert 0.0 < found["nclaw.slope.water.ours"].value < 1.0
     assert found["nclaw.slope.water.ours"].scale.startswith("60 particles, 20 steps, ")
+    assert "a stand-in for dragon30" in found["nclaw.slope.water.ours"].scale
     assert titles(fig02d.draw(results)) == ["start", "ours", "admissible", "truth"]
 
 

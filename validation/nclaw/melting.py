@@ -1,52 +1,44 @@
-"""A body that melts: its points change from one pair of laws to another, the lowest ones first
+"""Bodies that melt: their points change from one pair of laws to another, the lowest ones first
 (Figure 4b, NCLAW-multi).
 
-Points are ordered by their height at the start. As in the authors' release a threshold moves
-through that order from step 500 to step 1500; here it moves every `HOLD` steps. Both parts share
-one grid. Positions, velocities and deformation gradients stay as they are when a point changes.
+Points of each body are ordered by their height at the start. As in the authors' release a threshold
+moves through that order from step 500 to step 1500; here it moves every `HOLD` steps. All share one
+grid. Positions, velocities and deformation gradients stay as they are when a point changes.
 """
 
 import numpy as np
 
 from mpm_ref.body import Body, keep_inside, particles_at, restore_order
 from mpm_ref.core.grid import OutOfRange
+from mpm_ref.nclaw.study.compare import RunBroken
 
 FIRST, LAST = 500, 1500     # steps
 HOLD = 20                   # steps between changes
 
 
 def melting(problem, before, after):
-    """Yield positions (n, 3) of the points of a problem's one body at the start and at each frame;
-    NaN from where it breaks down on.
+    """Yield positions (n, 3) of the points of a problem's bodies, one after the other, at the start
+    and at each frame.
 
     before, after: functions that make of a body the same one of other laws. Frames are multiples of
-    `HOLD` steps.
+    `HOLD` steps. Raises `RunBroken` where a point has no finite place after `HOLD` steps.
     """
-    missing = 1 + problem.clock.steps // problem.clock.every
-    for x in valid_positions(problem, before, after):
-        missing -= 1
-        yield x
-    for _ in range(missing):
-        yield np.full_like(x, np.nan)
-
-
-def valid_positions(problem, before, after):
-    """Yield the positions of `melting` as long as every point has a finite place."""
     clock, stepper = problem.clock, problem.stepper()
-    state = joined_body([before(problem.bodies[0])])
-    rank = np.argsort(np.argsort(state.particles.x[:, 1]))
+    ranks = [np.argsort(np.argsort(body.particles.x[np.argsort(body.id), 1]))
+             for body in problem.bodies]
+    state = joined_body([before(body) for body in with_ids_in_turn(problem.bodies)])
     yield state.particles.x.copy()
     for k in range(0, clock.steps, HOLD):
-        melted = rank < melted_points(k, len(rank))
+        melted = np.concatenate([rank < melted_points(k, len(rank)) for rank in ranks])
         parts = [law(part(state, which)) for law, which in ((before, ~melted), (after, melted))
                  if which.any()]
         try:
             step_parts(problem, stepper, parts, k)
-        except OutOfRange:
-            return
+        except OutOfRange as fault:
+            raise RunBroken(k + HOLD, str(fault)) from None
         state = joined_body(parts)
         if not np.isfinite(state.particles.x).all():
-            return
+            raise RunBroken(k + HOLD, "a point has no finite place")
         if (k + HOLD) % clock.every == 0:
             yield state.particles.x.copy()
 
@@ -72,6 +64,12 @@ def part(body, which):
     particles = particles_at(*(a[which] for a in (q.x, q.v, q.m, q.V0)))
     particles.C[:], particles.F[:] = q.C[which], q.F[which]
     return Body(body.name, particles, body.law, body.flow, body.id[which])
+
+
+def with_ids_in_turn(bodies):
+    """Return bodies whose ids go on from those of the body before."""
+    first = np.cumsum([0, *(len(body.id) for body in bodies)])
+    return [body._replace(id=body.id + k) for body, k in zip(bodies, first[:-1], strict=True)]
 
 
 def joined_body(parts):

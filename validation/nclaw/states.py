@@ -1,5 +1,7 @@
 """Points of the four training runs, and of laws in other runs, for NCLaw's figures of states."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from mpm_ref.nclaw.gnn.simulator import Simulator
@@ -21,12 +23,20 @@ BROKEN = "it broke down before: some points have no finite place"
 COMPARED = ("ours", "neural", "gnn")    # in Figure 2
 
 
+class Shots(NamedTuple):
+    """The frames of a run."""
+
+    x: np.ndarray           # (frames, n, 3) positions [m], NaN from where it breaks down on
+    end: RunBroken | None   # where it does
+
+
 @experiment("nclaw.fig6", title="NCLaw: the four training runs",
             profiles=("quick", "standard"), budget={"quick": 10, "standard": 10})
 def training(run):
     """Keeps the points of each environment at five times."""
     scenes = {name: with_(reconstruction(name), every=SHOTS[1]) for name in ENVIRONMENTS}
-    found = {name: shots(scene, copy_body) for name, scene in run.progress(scenes.items(), "runs")}
+    found = {name: shots(scene, copy_body).x
+             for name, scene in run.progress(scenes.items(), "runs")}
     keep(run, t=[k * scenes["jelly"].dt for k in SHOTS], **found)
     for name, x in found.items():
         run.record(f"nclaw.fig6.{name}.low", x[-1, :, 1].min(), unit="m", comparator="info",
@@ -67,21 +77,25 @@ def ends(scene, law):
     needs all frames in between.
     """
     every = scene.every if isinstance(law, Simulator) else scene.steps
-    return shots(with_(scene, every=every), law)[[0, -1]]
+    return shots(with_(scene, every=every), law).x[[0, -1]]
 
 
 def shots(scene, law):
-    """Return positions (k, n, 3) of a scene's frames with a law, as of `evaluate.frames`; NaN from
-    where it breaks down on.
-    """
-    problem, positions = build(scene), []
+    """Return the `Shots` of a scene's frames with a law, as of `evaluate.frames`."""
+    problem = build(scene)
     with threads_for(problem.bodies):
-        try:
-            positions += frames(problem, law)
-        except RunBroken:
-            missing = 1 + scene.steps // scene.every - len(positions)
-            positions += missing * [np.full_like(positions[0], np.nan)]
-    return np.array(positions)
+        return collect(frames(problem, law), 1 + scene.steps // scene.every)
+
+
+def collect(run, count):
+    """Return the `Shots` of a run of so many frames, an iterator over positions (n, 3)."""
+    positions, end = [], None
+    try:
+        positions += run
+    except RunBroken as fault:
+        end = fault
+        positions += (count - len(positions)) * [np.full_like(positions[0], np.nan)]
+    return Shots(np.array(positions), end)
 
 
 def record(run, target, last, steps):

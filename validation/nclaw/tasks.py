@@ -77,7 +77,7 @@ def geometry(name):
 def slope():
     """A small body of dense water on a plane inclined by turning, and weakening, gravity."""
     scene = environment("water")
-    body = with_(scene.body[0], shape=toy("dragon", 0.1, (0.5, 0.075, 0.3)), density=5000.0,
+    body = with_(scene.body[0], shape=toy("dragon30", 0.1, (0.5, 0.075, 0.3)), density=5000.0,
                  velocity=Velocity(), sampling=Poisson(count=30000))
     return unit_cube(with_(scene, body=(body,), steps=1500, gravity=(0.0, -1.0, 0.866)), 128, 3)
 

@@ -6,10 +6,11 @@ import pytest
 
 from mpm_ref.nclaw.bodies import copy_body
 from mpm_ref.nclaw.study.compare import positions
-from mpm_ref.scene import build
+from mpm_ref.scene import Box, build
 from validation.common.scenes import with_
 from validation.nclaw import gallery, melting, other_bodies
 from validation.nclaw.environments import ENVIRONMENTS, environment
+from validation.nclaw.states import collect
 from validation.nclaw.tasks import unit_cube
 
 STEPS, EVERY = 60, 20
@@ -20,7 +21,7 @@ def scene():
     """A small cube of plasticine."""
     cube = environment("plasticine")
     few = with_(cube.body[0], sampling=with_(cube.body[0].sampling, counts=(4, 4, 4)))
-    return unit_cube(with_(gallery.cone(), body=(few,), steps=STEPS, every=EVERY), 10, 1)
+    return unit_cube(with_(gallery.dessert(), body=(few,), steps=STEPS, every=EVERY), 10, 1)
 
 
 def fluffy(body):
@@ -64,14 +65,40 @@ def nowhere(body):
 
 
 def test_a_run_that_breaks_down_has_frames_of_nan(scene, monkeypatch):
-    """As many as were asked for, from the first change on."""
+    """As many as were asked for, from the first change on, and the step."""
     monkeypatch.setattr(melting, "FIRST", 10)
     monkeypatch.setattr(melting, "LAST", 30)
-    whole = [*melting.melting(build(scene), copy_body, copy_body)]
-    found = [*melting.melting(build(scene), copy_body, nowhere)]
-    assert len(found) == len(whole)
-    assert np.array_equal(found[:2], whole[:2])
-    assert np.isnan(found[2:]).all()
+    count = 1 + STEPS // EVERY
+    whole = collect(melting.melting(build(scene), copy_body, copy_body), count)
+    found = collect(melting.melting(build(scene), copy_body, nowhere), count)
+    assert whole.end is None
+    assert found.end.step == 2 * EVERY
+    assert len(found.x) == len(whole.x) == count
+    assert np.array_equal(found.x[:2], whole.x[:2])
+    assert np.isnan(found.x[2:]).all()
+
+
+def test_each_of_several_bodies_melts_from_its_own_lowest_points_on(scene, monkeypatch):
+    """Whatever their heights; their points keep their places in the positions."""
+    monkeypatch.setattr(melting, "FIRST", 0)
+    monkeypatch.setattr(melting, "LAST", 40)
+    cube, seen = scene.body[0], []
+    lower, upper = (
+        with_(cube, name=name, shape=Box(lower=(0.3, y, 0.3), upper=(0.5, y + 0.2, 0.5)))
+        for name, y in (("lower", 0.3), ("upper", 0.6)))
+
+    def after(body):
+        seen.append(body.id.copy())
+        return copy_body(body)
+
+    two = build(with_(scene, body=(lower, upper)))
+    start, *_ = melting.melting(two, copy_body, after)
+    assert start == pytest.approx(np.concatenate([body.particles.x for body in two.bodies]))
+    first = seen[0]
+    assert [np.count_nonzero(first < 64), np.count_nonzero(first >= 64)] == [32, 32]
+    for ids in (np.arange(64), np.arange(64, 128)):
+        assert (start[np.intersect1d(ids, first), 1].max()
+                <= start[np.setdiff1d(ids, first), 1].min())
 
 
 @pytest.mark.parametrize(("step", "share"), [(0, 0.0), (500, 0.0), (1000, 0.5), (2000, 1.0)])

@@ -1,5 +1,7 @@
 """NCLaw's tasks: scenes with the settings of the authors' release, velocities as it draws them."""
 
+from hashlib import sha256
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,10 @@ def test_a_mesh_of_the_users_is_taken_instead(tmp_path, monkeypatch):
     file = tmp_path / "nclaw" / "bunny.obj"
     file.parent.mkdir()
     file.write_text("v 0 0 0")
+    with pytest.raises(ValueError, match=r"bunny\.obj: another file .* its sha256 is [0-9a-f]{64}, "
+                                         r"expected b83f4af5[0-9a-f]{56}; take"):
+        stand_in_bodies.toy("bunny", 0.7)
+    monkeypatch.setitem(stand_in_bodies.SHA256, "bunny", sha256(b"v 0 0 0").hexdigest())
     assert stand_in_bodies.toy("bunny", 0.7) == Mesh(file=str(file), size=0.7,
                                                      center=(0.5, 0.5, 0.5))
     assert stand_in_bodies.body_label("bunny") == "bunny"
@@ -83,10 +89,12 @@ def test_a_mesh_of_the_users_is_taken_instead(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("scene", [tasks.slope(), gallery.large(), gallery.contact(),
-                                   gallery.pool()],
-                         ids=["slope", "large", "contact", "pool"])
+                                   gallery.pool(), gallery.dessert()],
+                         ids=["slope", "large", "contact", "pool", "dessert"])
 def test_bodies_that_are_only_looked_at_are_within_the_box(scene):
-    low, high = scene.clip.lower, scene.clip.upper
+    """But for the dessert, whose box in the release ends a millimetre or two below the clip."""
+    below = 0.003 if scene.body[0].name == "icecream" else 0.0
+    low, high = np.array(scene.clip.lower) - below, scene.clip.upper
     for body in scene.body:
         found = solid(body.shape)
         assert (found.low >= low).all()
@@ -106,6 +114,29 @@ def test_the_pool_holds_as_many_points_as_printed():
     assert len(duck.particles.x) + len(water.particles.x) == 102_294
     assert water.particles.m[0] / water.particles.V0[0] == pytest.approx(3000.0)
     assert problem.clock == Clock(dt=5e-4, steps=3000, every=5)
+
+
+def test_the_dessert_is_as_large_as_its_meshes_and_the_chocolate_denser():
+    icecream, chocolate = gallery.dessert().body
+    volumes = [solid(stand_in_bodies.toy(body.name, 1.0)).volume for body in (icecream, chocolate)]
+    assert volumes == pytest.approx([0.1845, 0.0254], rel=0.06)     # of the meshes
+    assert (icecream.density, chocolate.density) == (1000.0, 2000.0)
+    counts = [body.sampling.count for body in (icecream, chocolate)]
+    bunny = tasks.TOYS["plasticine"].points / 0.19857       # points over the mesh's volume
+    assert counts == pytest.approx([bunny * 0.1845, bunny * 0.0254], rel=0.01)
+
+
+def test_a_halved_scene_has_its_walls_and_clip_where_they_were():
+    whole = gallery.pool()
+    half = gallery.halved(whole)
+    assert half.dx == 2.0 * whole.dx
+    assert half.clip == whole.clip
+    for k in (0, 1, 2):     # the last node of the lower wall, the first of the upper one
+        assert (half.walls.low[k] - 1) * half.dx == (whole.walls.low[k] - 1) * whole.dx
+        assert (half.walls.high[k] + 1) * half.dx == (whole.walls.high[k] + 1) * whole.dx
+    duck, water = half.body
+    assert (duck.sampling.count, water.sampling.counts) == (1011, (32, 12, 32))
+    assert gallery.halved(gallery.large(0.01)).body[0].sampling.spacing == 0.02
 
 
 def test_toys_run_to_the_middle():
