@@ -19,11 +19,12 @@ from mpm_ref.rom.train.settings import device_of
 from mpm_ref.rom.train.stages import POSITION, StagePlan, train_stages
 from mpm_ref.training import DEVICES, Machine, TrainingTime
 
-from ..nsf.networks import FOLDER, identity, narrow, net_of, nets
+from ..nsf.networks import FOLDER, identity, narrow, nets
+from ..nsf.printed_networks import printed_nets
 from .common import CHECKPOINTS, Checkpoints, Device, Folder, Names, Threads, origin, train_all
 
-SHOWN = 50          # epochs of which the loss is stored
-LEVELS = 12         # time levels of each run for the errors, about
+SHOWN = 50                  # epochs of which the loss is stored
+LEVELS, POINTS = 12, 5000   # time levels of each run for the errors, and points, about
 
 
 def plan_of(net):
@@ -65,9 +66,14 @@ class ProgressBar:
         self.bar.set_postfix(stage=stage, loss=f"{np.ravel(losses[-1])[0]:.1e}")
 
 
+def trainings():
+    """Return {name: `FieldsNet`} of all trainings."""
+    return nets() | narrow() | printed_nets()
+
+
 def trained_fields(name, checkpoints, machine):
     """Return the trained `Model` of a name, with how it was made."""
-    net = net_of(name)
+    net = trainings()[name]
     checkpoints.mkdir(parents=True, exist_ok=True)
     runs = runs_of(net.study)
     with tqdm(total=ProgressBar.total(net), desc=name, unit_scale=True) as bar:
@@ -84,17 +90,19 @@ def trained_fields(name, checkpoints, machine):
 
 
 def errors_of(model, runs):
-    """Return the errors of the networks on some of their training snapshots, over the norms of the
-    snapshots' fields.
+    """Return the errors of the networks on some of their training snapshots at some points, over
+    the norms of the snapshots' fields.
     """
     sums = {name: np.zeros(2) for name in ("displacement", "stress", "affine")}
+    shown = slice(None, None, -(-len(runs.X) // POINTS))
     for run, mu in enumerate(runs.mu):
         for k in range(0, runs.x.shape[1], -(-runs.x.shape[1] // LEVELS)):
-            xhat, X, (g, h, l) = model.xhat[run, k], runs.X, model.field
+            xhat, X, (g, h, l) = model.xhat[run, k], runs.X[shown], model.field
+            x, tau, C = (a[run, k, shown] for a in (runs.x, runs.tau, runs.C))
             for name, prediction, reference in (
-                    ("displacement", g.place(X, xhat) - X, runs.x[run, k] - X),
-                    ("stress", h.values(X, xhat, h.needed_parameters(mu)), runs.tau[run, k]),
-                    ("affine", l.values(X, xhat, l.needed_parameters(mu)), runs.C[run, k])):
+                    ("displacement", g.place(X, xhat) - X, x - X),
+                    ("stress", h.values(X, xhat, h.needed_parameters(mu)), tau),
+                    ("affine", l.values(X, xhat, l.needed_parameters(mu)), C)):
                 sums[name] += (np.sum((prediction - reference)**2),
                                np.sum(reference**2, dtype=float))
     return {name: float(np.sqrt(off / norm)) for name, (off, norm) in sums.items()}
@@ -119,7 +127,7 @@ def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints 
         save(folder / f"{name}.npz", trained_fields(name, stages, machine))
         rmtree(stages)
 
-    train_all(names, nets() | narrow(), (folder, checkpoints), threads, make)
+    train_all(names, trainings(), (folder, checkpoints), threads, make)
 
 
 if __name__ == "__main__":

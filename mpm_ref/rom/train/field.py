@@ -18,7 +18,7 @@ from ...training import TrainingTime, sha256, train_epochs
 from ..fields.network import Field
 from ..snapshots import field_units
 from .networks import FieldPerceptron, network_of
-from .session import SAVE, NetworkSession, checkpoint_interval, require_valid
+from .session import SAVE, NetworkSession, checkpoint_interval, on_processor, require_valid
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class FieldData(NamedTuple):
     X: np.ndarray           # (n, d)            points at rest [m]
     xhat: np.ndarray        # (s, k + 1, r)     latent coordinates
     mu: np.ndarray          # (s, q)            parameters
-    values: np.ndarray      # (s, k + 1, n, k)  need not be in memory
+    values: np.ndarray      # (s, k + 1, n, k)  on a processor they need not be in memory
     dt: float               #                   length of a step [s]
 
 
@@ -77,6 +77,7 @@ class FieldSession(NetworkSession):
         xhat = data.xhat.reshape(runs * levels, -1)
         self.variables, self.r = self.single(np.hstack([xhat, scaled])), xhat.shape[1]
         self.values = data.values.reshape(runs * levels, n, k)
+        self.stored = None if on_processor(device) else self.standardised(self.values)
         d, inputs = data.X.shape[1], self.variables.shape[1]
         self.f = FieldPerceptron(d, inputs, settings.hidden, k, settings.octaves)
         self.learn(f=self.f)
@@ -89,12 +90,17 @@ class FieldSession(NetworkSession):
             states = states + pad(jitter, (0, states.shape[1] - self.r))
         y = self.f(self.X[points].repeat(len(batch), 1),
                    states.repeat_interleave(len(points), dim=0))
-        return mse_loss(y, self.standardised(batch, points)), ()
+        return mse_loss(y, self.values_at(batch, points).flatten(0, 1)), ()
 
-    def standardised(self, batch, points):
-        """Return the values (s m, k) of snapshots at points, in the field's units."""
-        values = self.values[batch.numpy()[:, None], points.numpy()]
-        return self.single((values - self.units.mean) / self.units.std).flatten(0, 1)
+    def values_at(self, batch, points):
+        """Return the values (s, m, k) of snapshots at points, in the field's units."""
+        if self.stored is not None:
+            return self.stored[batch[:, None], points]
+        return self.standardised(self.values[batch.numpy()[:, None], points.numpy()])
+
+    def standardised(self, values):
+        """Return values in the field's units, as a tensor."""
+        return self.single((values - self.units.mean) / self.units.std)
 
     def single(self, a):
         """Return an array as a tensor of single precision."""

@@ -17,6 +17,7 @@ from validation.common.run import RunSetting, run_all
 from validation.common.weights_needed import Untrained
 from validation.nsf import networks as kept
 from validation.nsf import networks_runs as runs
+from validation.nsf import printed_networks as as_printed
 from validation.nsf import reduced_runs
 from validation.nsf.networks import (
     FieldsNet,
@@ -164,14 +165,15 @@ class Ready(reduced_runs.FittedStudy):
         return PositionErrors(0.001, 0.002, 0.003)
 
 
+def ready(model, study):
+    """Return a `Ready` study on networks."""
+    fields = fields_of(model, study)
+    test = type("History", (), {"X": fields.X, "x": np.zeros((1, 31, 1, 3))})
+    return Ready(study, fields, model.xhat, None, {0.45: test})
+
+
 def test_errors_are_means_in_per_cent(folder, monkeypatch):
     save(folder / "jelly.npz", model())
-
-    def ready(model, study):
-        fields = fields_of(model, study)
-        test = type("History", (), {"X": fields.X, "x": np.zeros((1, 31, 1, 3))})
-        return Ready(study, fields, model.xhat, None, {0.45: test})
-
     monkeypatch.setattr(runs, "fit_to_networks", ready)
     found = recorded(folder)
     assert found["nsf.jelly.error.plain"].value == pytest.approx(2.0)           # mean of 1, 2, 3 %
@@ -219,6 +221,30 @@ def test_weights_of_samples_are_those_of_modes_of_the_same_runs(folder):
 def test_networks_have_the_ids_of_the_printed_errors(name, id):
     assert runs.printed_error(name, f"nsf.networks.{name}") == id
     assert (runs.own_rule(name) == {}) is ("networks" not in id)
+
+
+def test_networks_as_printed_have_the_widths_epochs_and_rates_of_the_paper():
+    """By hand from Table 1 and appendix E, with the epochs of all rates together."""
+    net = as_printed.printed_nets()["jelly-printed"]
+    assert [(own.width, own.epochs, own.jitter) for own in (net.g, net.h, net.l)] == [
+        (96, 300, 0.0), (384, 600, 0.0), (576, 600, 0.0)]
+    assert (net.batch, net.latent, net.schedule) == (32, "encoder-nsf", "steps")
+
+
+def test_errors_of_networks_as_printed_are_those_of_their_runs(folder, monkeypatch):
+    about = {"errors": {"displacement": 0.04, "stress": 0.3, "affine": 0.2}}
+    monkeypatch.setattr(as_printed, "printed_nets", lambda: {"jelly-printed": NET})
+    monkeypatch.setattr(as_printed, "trained_as_printed",
+                        lambda name: model()._replace(about=about))
+    monkeypatch.setattr(as_printed, "fit_to_networks", ready)
+    setting = RunSetting("standard", folder / "out", targets=targets.load())
+    assert run_all([as_printed.networks_as_printed.experiment], setting) == []
+    found = {r.target.removeprefix("nsf.networks-printed.jelly-printed"): r.value
+             for r in ProfileResults(folder / "out").records("nsf.networks-printed")}
+    assert found[""] == pytest.approx(2.0)                  # mean of 1, 2, 3 %
+    assert found[".stress"] == pytest.approx(20.0)
+    assert found[".nearest"] == pytest.approx(0.1)
+    assert found[".fit.displacement"] == pytest.approx(4.0)
 
 
 def test_every_scene_has_the_id_of_a_printed_error():

@@ -1,0 +1,93 @@
+"""NSF's three networks as printed: widths, encoder, rates and resolution of the paper (NSF-arch,
+NSF-encoder, NSF-train).
+
+The paper shows all points of up to 32 snapshots at once, for 300 epochs of the position and 600 of
+the other two networks at each of five rates; it could mean these numbers in total, as is done here.
+Its trainings take 2 to 20 hours on a graphics processor. Here each batch shows a part of the
+points, drawn anew, which leaves the number of steps of the optimiser as it is.
+Each is a file of weights, made by `python -m validation.training.nsf NAME --folder
+results/training`; of 8 MB, it is not in the repository.
+"""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from mpm_ref.rom.model_file import load
+from mpm_ref.rom.study.errors import PositionErrors
+from mpm_ref.rom.train.stages import EPOCHS, FIELD_EPOCHS
+
+from ..common.registry import experiment
+from ..common.weights_needed import load_available, load_weights
+from .errors import COLUMNS, error_rows, mean, record_errors, record_mean
+from .networks import FieldsNet, NetworkPlan, identity
+from .networks_runs import DRAWS, TRAINED, fit_to_networks, printed, scale_of
+from .studies import jelly
+
+FOLDER = Path(__file__).parents[2] / "results" / "training"
+
+BATCH, POINTS = 32, 32      # snapshots, and points shown of each
+
+
+def printed_nets():
+    """Return {name: `FieldsNet`} of the scenes whose networks are trained as printed."""
+    return {"jelly-printed": as_printed(jelly())}
+
+
+def as_printed(study):
+    """Return the `FieldsNet` of a study with the printed widths, latent coordinates, epochs and
+    rates.
+    """
+    widths = printed(study.scene.removeprefix("nsf_"))
+    g, h, l = (NetworkPlan(widths[name], epochs, 0.0)
+               for name, epochs in zip("ghl", (EPOCHS, FIELD_EPOCHS, FIELD_EPOCHS), strict=True))
+    return FieldsNet(study, g, h, l, batch=BATCH, points=POINTS, latent="encoder-nsf",
+                     schedule="steps")
+
+
+@cache
+def trained_as_printed(name):
+    """Return the `Model` of a scene. Raises as `networks.trained`."""
+    return load_weights(FOLDER / f"{name}.npz", identity(printed_nets()[name]), load,
+                        f"python -m validation.training.nsf {name} --folder results/training")
+
+
+@experiment("nsf.networks-printed", title="NSF: networks with the printed widths and encoder",
+            profiles=("standard",), budget={"standard": 1500})
+def networks_as_printed(run):
+    """Record the errors of these networks on their training runs, and of reduced runs on them."""
+    rows = []
+    for name, model in load_available(run, printed_nets(), trained_as_printed).items():
+        net = printed_nets()[name]
+        one = fit_to_networks(model, net.study)
+        record_fit(run, name, model.about["errors"], scale_of(net, one))
+        rows += record_runs(run, name, one, scale_of(net, one))
+    run.table("errors", ("scene", *COLUMNS[1:]), rows)
+
+
+def record_fit(run, name, errors, scale):
+    """Record the errors of three networks on some of their training snapshots."""
+    for field, error in errors.items():
+        run.record(f"nsf.networks-printed.{name}.fit.{field}", 100.0 * error, unit="%",
+                   comparator="info", scale=scale, note="on snapshots of the training, over the "
+                   "norm of the field")
+
+
+def record_runs(run, name, one, scale):
+    """Record the errors of reduced runs with few samples and of the nearest states; return rows."""
+    target, few = f"nsf.networks-printed.{name}", one.study.samples
+    rows = [row for draw in run.progress(range(DRAWS), f"{name}, {few} samples")
+            for row in error_rows(one, name, few, (draw,))]
+    record_mean(run, target, rows, scale, f"{few} samples", **TRAINED)
+    run.record(f"{target}.stress", 100.0 * mean(rows, "stress"), unit="%", comparator="info",
+               scale=scale, note="of the Kirchhoff stress, all particles and times")
+    nearest = [one.nearest_state_errors(value) for value in one.study.test]
+    record_errors(run, f"{target}.nearest", mean_errors(nearest), scale,
+                  "nearest states that the networks know", **TRAINED)
+    return rows
+
+
+def mean_errors(errors):
+    """Return the mean of some `PositionErrors`."""
+    return PositionErrors(*np.mean(errors, axis=0))
