@@ -16,7 +16,6 @@ import numpy as np
 
 from mpm_ref.rom.model_file import load
 from mpm_ref.rom.study.errors import PositionErrors
-from mpm_ref.rom.train.stages import EPOCHS, FIELD_EPOCHS
 
 from ..common.registry import experiment
 from ..common.weights_needed import load_available, load_weights
@@ -27,7 +26,8 @@ from .studies import jelly
 
 FOLDER = Path(__file__).parents[2] / "results" / "training"
 
-BATCH, POINTS = 32, 32      # snapshots, and points shown of each
+BATCH, POINTS = 32, 32                      # snapshots, and points shown of each
+EPOCHS = {"g": 300, "h": 600, "l": 600}    # of each network (NSF-train)
 
 
 def printed_nets():
@@ -40,8 +40,7 @@ def as_printed(study):
     rates.
     """
     widths = printed(study.scene.removeprefix("nsf_"))
-    g, h, l = (NetworkPlan(widths[name], epochs, 0.0)
-               for name, epochs in zip("ghl", (EPOCHS, FIELD_EPOCHS, FIELD_EPOCHS), strict=True))
+    g, h, l = (NetworkPlan(widths[name], EPOCHS[name], 0.0) for name in "ghl")
     return FieldsNet(study, g, h, l, batch=BATCH, points=POINTS, latent="encoder-nsf",
                      schedule="steps")
 
