@@ -14,6 +14,13 @@ from tests.nclaw.test_invariants import near_rest, turns
 
 torch = pytest.importorskip("torch")
 
+from mpm_ref.materials import (  # noqa: E402
+    DruckerPrager,
+    Fluid,
+    FluidProjection,
+    Hencky,
+    VonMises,
+)
 from mpm_ref.materials.learned.contraction import Contraction  # noqa: E402
 from mpm_ref.materials.learned.energetic import Energetic  # noqa: E402
 from mpm_ref.materials.learned.response import (  # noqa: E402
@@ -23,7 +30,8 @@ from mpm_ref.materials.learned.response import (  # noqa: E402
     Stress,
     SymmetricStress,
 )
-from mpm_ref.nclaw.batched_step import make_world  # noqa: E402
+from mpm_ref.nclaw.batched_step import make_nodes, make_world  # noqa: E402
+from mpm_ref.nclaw.dissipation import returned  # noqa: E402
 from mpm_ref.nclaw.train.autograd import Invariants  # noqa: E402
 from mpm_ref.nclaw.train.fit import TrajectorySession  # noqa: E402
 from mpm_ref.nclaw.train.neural_laws import (  # noqa: E402
@@ -38,7 +46,14 @@ from mpm_ref.nclaw.train.recipe import (  # noqa: E402
     Recipe,
     TeacherForcing,
 )
-from mpm_ref.nclaw.train.rollout import LawPair, segment_errors  # noqa: E402
+from mpm_ref.nclaw.train.rollout import (  # noqa: E402
+    DEFAULT,
+    LawPair,
+    over_points,
+    second_return,
+    segment_errors,
+    step,
+)
 from mpm_ref.nclaw.train.train import continued_laws, drawn_laws, learned_laws  # noqa: E402
 from mpm_ref.scene import build  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
@@ -110,6 +125,8 @@ def test_the_recipe_is_that_of_the_paper():
 
 
 @pytest.mark.parametrize(("settings", "said"), [
+    *(({name: value}, f"^{name} = {value}: expected a number >= 0$")
+      for name in ("velocity", "idempotence") for value in (-1e-9, float("inf"), float("nan"))),
     *(({name: 0}, f"^{name} = 0: expected at least 1$")
       for name in ("epochs", "first", "last", "batch")),
     *(({name: value}, f"^{name} = {value}: expected a positive number$")
@@ -275,7 +292,7 @@ def test_states_between_are_computed_anew(run, every):
     for keep_every in (1, every):
         laws = neural_laws(0, *STIFF)
         errors = segment_errors(laws, *run, [0, 2], [2, STEPS],
-                                Recipe(keep_every=keep_every, velocity=1e-4))
+                                Recipe(keep_every=keep_every, velocity=1e-4, idempotence=1.0))
         errors.loss.backward()
         found[keep_every] = errors, [a.grad for a in parameters(laws)]
         assert not errors.positions.requires_grad
@@ -307,9 +324,51 @@ def test_errors_of_velocities_count_as_told(run):
     assert found.positions < 1e-26
 
 
-def gradients(laws, run, cuts):
+@pytest.mark.parametrize("keep_every", [1, 2])
+def test_a_second_return_counts_as_told(run, keep_every):
+    """In the loss, beside errors of positions, times its weight [m^2], after each step of each
+    segment.
+    """
+    half = LawPair(jelly, halfway)
+    none, one = (segment_errors(half, *run, [0, 3], [3, 5],
+                                Recipe(idempotence=weight, keep_every=keep_every))
+                 for weight in (0.0, 1e-3))
+    expected = 0.0
+    for level, count in ((0, 3), (3, 2)):
+        state, nodes = run[1].states(torch.tensor([level])), make_nodes(run[0], 1)
+        for _ in range(count):
+            state = step(half, run[0], state, nodes)
+            expected += 1e-3 * (0.25 * (state[3] - torch.eye(3)) ** 2).mean().item()
+    assert (one.loss - none.loss).item() == pytest.approx(expected, rel=1e-9)
+    assert one.positions == none.positions
+
+
+def halfway(F):
+    """A map that is no projection: half of the way to I, squared displacements by a quarter."""
+    return torch.eye(3) + 0.5 * (F - torch.eye(3))
+
+
+@pytest.mark.parametrize(("law", "flow"), [(Fluid(2.0), FluidProjection()),
+                                           (Hencky(2.0, 1.0), VonMises(0.3, 0.05)),
+                                           (Hencky(2.0, 1.0), DruckerPrager(0.3, 0.05))])
+def test_projections_have_no_second_return(law, flow, rng):
+    """Of the true flows, which change F; a map that goes half of the way has one."""
+    F = torch.from_numpy(near_rest(12, 3, rng)).reshape(2, 6, 3, 3)
+    once = over_points(flow_of(law, flow), F)
+    assert (once - F).abs().amax(dim=(1, 2, 3)).min() > 0.01
+    assert second_return(flow_of(law, flow), once) < 1e-28
+    assert second_return(halfway, F) == pytest.approx(
+        0.25 * ((F - torch.eye(3)) ** 2).mean(dim=(1, 2, 3)).sum().item(), rel=1e-12)
+
+
+def flow_of(law, flow):
+    """A true flow as a function of tensors F (n, 3, 3)."""
+    return lambda F: torch.from_numpy(returned(law, flow, F.numpy()))
+
+
+def gradients(laws, run, cuts, recipe=DEFAULT):
     """Loss, and gradients of all weights."""
-    loss = segment_errors(laws, *run, cuts[:-1], cuts[1:]).loss
+    loss = segment_errors(laws, *run, cuts[:-1], cuts[1:], recipe).loss
     return loss, torch.autograd.grad(loss, parameters(laws))
 
 
@@ -318,11 +377,14 @@ def doubled(laws):
 
 
 @pytest.mark.usefixtures("double")
-@pytest.mark.parametrize("kind", [Stress(1e5), SymmetricStress(1e5)], ids=["paper", "symmetric"])
-def test_remainder_is_of_second_order_in_the_weights(run, kind):
+@pytest.mark.parametrize(("kind", "recipe"), [
+    (Stress(1e5), DEFAULT), (SymmetricStress(1e5), DEFAULT),
+    (Stress(1e5), Recipe(idempotence=1.0))], ids=["paper", "symmetric", "idempotence"])
+def test_remainder_is_of_second_order_in_the_weights(run, kind, recipe):
     """Through all steps of a segment, networks of doubles; each law by itself, and both."""
     laws, cuts = doubled(neural_laws(0, kind, STIFF[1])), [0, STEPS]
-    slopes, start = gradients(laws, run, cuts)[1], [a.detach().clone() for a in parameters(laws)]
+    slopes = gradients(laws, run, cuts, recipe)[1]
+    start = [a.detach().clone() for a in parameters(laws)]
     for turned in ([1, 1, 1, 0, 0, 0], [0, 0, 0, 1, 1, 1], [1] * 6):
         torch.manual_seed(1)
         direction = [on * a.std() * torch.randn_like(a) for on, a in zip(turned, start)]
@@ -331,7 +393,7 @@ def test_remainder_is_of_second_order_in_the_weights(run, kind):
             with torch.no_grad():
                 for a, first, da in zip(parameters(laws), start, direction):
                     a[:] = first + h * da
-                return segment_errors(laws, *run, cuts[:-1], cuts[1:]).loss.item()
+                return segment_errors(laws, *run, cuts[:-1], cuts[1:], recipe).loss.item()
 
         slope = sum((g * da).sum() for g, da in zip(slopes, direction)).item()
         assert rate(loss, slope, H) == pytest.approx(2.0, abs=0.1)
