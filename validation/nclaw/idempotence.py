@@ -2,10 +2,10 @@
 
 The true return maps are projections: a second one changes nothing. Nothing in the printed training
 asks that of the learned one, which returns a part of a strain in each step, and the stress is
-learned for the F that it leaves: so both belong to the time step of training. The variant adds
-`Recipe.idempotence` times the mean squared change of F in a second return to the loss. The weight
-was set on small trainings, by their training run. Weights are remade by
-`python -m validation.training.nclaw NAME`.
+learned for the F that it leaves: so both belong to the time step of training. The variant goes on
+from the printed training with `Recipe.idempotence` times the mean squared change of F in a second
+return in its loss; beside it stands a training that goes on alike without the term. Each is a file
+of weights, remade by `python -m validation.training.nclaw NAME`.
 """
 
 from functools import cache, partial
@@ -32,8 +32,7 @@ from .longer_horizons import continued_laws
 from .printed_ids import error_id
 from .trained_laws import nets, trained
 
-AGAIN, IDEMPOTENT = "again", "idempotent"
-WEIGHTS = {AGAIN: 0.0, IDEMPOTENT: 0.3}     # [m^2], of a second return in the loss
+WEIGHTS = {"again": 0.0, "idempotent-weak": 0.03, "idempotent": 0.3}    # [m^2], of the term
 NAMES = ("water",)      # environments of which the variant is trained
 SCHEDULE = {"epochs": 60, "first": 50, "last": 200, "elastic_rate": 0.3, "plastic_rate": 0.03}
 FACTORS = 0.5, 2.0      # times the step of training
