@@ -32,9 +32,9 @@ from .longer_horizons import continued_laws
 from .printed_ids import error_id
 from .trained_laws import nets, trained
 
-WEIGHTS = {"again": 0.0, "idempotent-weak": 0.03, "idempotent": 0.3}    # [m^2], of the term
+WEIGHTS = {"again": 0.0, "idempotent": 0.3}      # [m^2], of the term
 NAMES = ("water",)      # environments of which the variant is trained
-SCHEDULE = {"epochs": 60, "first": 50, "last": 200, "elastic_rate": 0.3, "plastic_rate": 0.03}
+SCHEDULE = {"epochs": 24, "first": 50, "last": 200, "elastic_rate": 0.3, "plastic_rate": 0.03}
 FACTORS = 0.5, 2.0      # times the step of training
 SHEAR = 1e-3            # size of what is added to F, over that of F
 EVERY = 50              # steps between the states that are probed

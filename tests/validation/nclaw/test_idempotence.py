@@ -42,7 +42,7 @@ def test_trainings_differ_by_the_term_alone():
     (MaterialLaws(Fluid(1.0), FluidProjection()), 0.0)])
 def test_share_of_a_shear_that_a_return_passes_on(pair, share, rng):
     """Nothing of a fluid's but the change of volume, which is of second order; all without one."""
-    F = (1.0 + 0.1 * rng.random(9))[:, None, None] * np.eye(3)
+    F = np.eye(3) + 0.1 * rng.normal(size=(9, 3, 3))
     A = shears(9, rng)
     assert np.trace(A, axis1=1, axis2=2) == pytest.approx(np.zeros(9), abs=1e-15)
     assert np.linalg.norm(A, axis=(1, 2)) == pytest.approx(np.ones(9))
