@@ -42,7 +42,7 @@ STEPS = ("method", "environment", "factor", "error", "step", "why")
 
 
 class Returns(NamedTuple):
-    """What the return map of a run does to small strains."""
+    """The effect of the return map of a run on small strains."""
 
     shares: list        # 5, 50 and 95 % of the share of an added shear that it passes on
     second: float       # change of F in a second return, over that of a step before the first
@@ -160,19 +160,27 @@ def shears(n, rng):
 
 
 def passed_on(pair, F, A):
-    """Return the share (n,) of a small shear A F that a return leaves in F (n, 3, 3)."""
-    added = SHEAR * A @ F
-    left = returned(*pair, F + added) - returned(*pair, F)
-    return np.linalg.norm(left, axis=(1, 2)) / np.linalg.norm(added, axis=(1, 2))
+    """Return the share (n,) of a small shear A F of F (n, 3, 3) that a return leaves, by the change
+    of F F^T, which no rotation has a part in.
+    """
+    sheared = F + SHEAR * A @ F
+    left = squared(returned(*pair, sheared)) - squared(returned(*pair, F))
+    return (np.linalg.norm(left, axis=(1, 2))
+            / np.linalg.norm(squared(sheared) - squared(F), axis=(1, 2)))
 
 
-def record_returns(run, whose, found):
+def squared(F):
+    """Return F F^T (n, 3, 3)."""
+    return F @ F.swapaxes(1, 2)
+
+
+def record_returns(run, whose, returns):
     """Record the `Returns` of a method on an environment, `whose`."""
     method, name = whose
-    id, where = f"nclaw.idempotence.{method}.{name}", f"1000 particles, {found.frames} states"
-    low, middle, high = found.shares
+    id, where = f"nclaw.idempotence.{method}.{name}", f"1000 particles, {returns.frames} states"
+    low, middle, high = returns.shares
     run.record(f"{id}.passed", middle, unit="1", comparator="info", scale=where,
                note=f"median share of an added shear that the return map passes on; 5 and 95 % "
-                    f"{low:.2g} and {high:.2g}" + (f"; {found.why}" if found.why else ""))
-    run.record(f"{id}.second", found.second, unit="1", comparator="info", scale=where,
+                    f"{low:.2g} and {high:.2g}" + (f"; {returns.why}" if returns.why else ""))
+    run.record(f"{id}.second", returns.second, unit="1", comparator="info", scale=where,
                note="root mean square of the change of F in a second return, over that of a step")
