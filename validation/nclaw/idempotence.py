@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mpm_ref.materials import Fluid, FluidProjection
 from mpm_ref.materials.learned import learned_flow, learned_law
 from mpm_ref.nclaw.bodies import body_with_laws, deformation_gradients
 from mpm_ref.nclaw.dissipation import returned
@@ -93,10 +94,17 @@ def available_laws(run):
 
 def material_laws(laws):
     """Return {(method, environment): `MaterialLaws`} of the true laws and of learned ones."""
-    true = {(TRUE, name): build(environment(name)).bodies[0] for name in NAMES}
-    return {**{key: MaterialLaws(body.law, body.flow) for key, body in true.items()},
+    return {**{(TRUE, name): true_laws(name) for name in NAMES},
             **{(method, name): MaterialLaws(learned_law(pair.elastic), learned_flow(pair.plastic))
                for method, by_name in laws.items() for name, pair in by_name.items()}}
+
+
+def true_laws(name):
+    """Return the `MaterialLaws` of an environment; a fluid's with its projection, without which the
+    scene carries J alone.
+    """
+    body = build(environment(name)).bodies[0]
+    return MaterialLaws(body.law, FluidProjection() if isinstance(body.law, Fluid) else body.flow)
 
 
 def record_errors(run, task, rows):
