@@ -38,7 +38,7 @@ from mpm_ref.nclaw.train.recipe import (  # noqa: E402
     Recipe,
     TeacherForcing,
 )
-from mpm_ref.nclaw.train.rollout import LawPair, segment_errors  # noqa: E402
+from mpm_ref.nclaw.train.rollout import DEFAULT, LawPair, segment_errors  # noqa: E402
 from mpm_ref.nclaw.train.train import continued_laws, drawn_laws, learned_laws  # noqa: E402
 from mpm_ref.scene import build  # noqa: E402
 from mpm_ref.trajectories import observed  # noqa: E402
@@ -110,6 +110,8 @@ def test_the_recipe_is_that_of_the_paper():
 
 
 @pytest.mark.parametrize(("settings", "said"), [
+    *(({name: value}, f"^{name} = {value}: expected a number >= 0$")
+      for name in ("velocity", "idempotence") for value in (-1e-9, float("inf"), float("nan"))),
     *(({name: 0}, f"^{name} = 0: expected at least 1$")
       for name in ("epochs", "first", "last", "batch")),
     *(({name: value}, f"^{name} = {value}: expected a positive number$")
@@ -275,7 +277,7 @@ def test_states_between_are_computed_anew(run, every):
     for keep_every in (1, every):
         laws = neural_laws(0, *STIFF)
         errors = segment_errors(laws, *run, [0, 2], [2, STEPS],
-                                Recipe(keep_every=keep_every, velocity=1e-4))
+                                Recipe(keep_every=keep_every, velocity=1e-4, idempotence=1.0))
         errors.loss.backward()
         found[keep_every] = errors, [a.grad for a in parameters(laws)]
         assert not errors.positions.requires_grad
@@ -307,9 +309,9 @@ def test_errors_of_velocities_count_as_told(run):
     assert found.positions < 1e-26
 
 
-def gradients(laws, run, cuts):
+def gradients(laws, run, cuts, recipe=DEFAULT):
     """Loss, and gradients of all weights."""
-    loss = segment_errors(laws, *run, cuts[:-1], cuts[1:]).loss
+    loss = segment_errors(laws, *run, cuts[:-1], cuts[1:], recipe).loss
     return loss, torch.autograd.grad(loss, parameters(laws))
 
 
@@ -318,11 +320,14 @@ def doubled(laws):
 
 
 @pytest.mark.usefixtures("double")
-@pytest.mark.parametrize("kind", [Stress(1e5), SymmetricStress(1e5)], ids=["paper", "symmetric"])
-def test_remainder_is_of_second_order_in_the_weights(run, kind):
+@pytest.mark.parametrize(("kind", "recipe"), [
+    (Stress(1e5), DEFAULT), (SymmetricStress(1e5), DEFAULT),
+    (Stress(1e5), Recipe(idempotence=1.0))], ids=["paper", "symmetric", "idempotence"])
+def test_remainder_is_of_second_order_in_the_weights(run, kind, recipe):
     """Through all steps of a segment, networks of doubles; each law by itself, and both."""
     laws, cuts = doubled(neural_laws(0, kind, STIFF[1])), [0, STEPS]
-    slopes, start = gradients(laws, run, cuts)[1], [a.detach().clone() for a in parameters(laws)]
+    slopes = gradients(laws, run, cuts, recipe)[1]
+    start = [a.detach().clone() for a in parameters(laws)]
     for turned in ([1, 1, 1, 0, 0, 0], [0, 0, 0, 1, 1, 1], [1] * 6):
         torch.manual_seed(1)
         direction = [on * a.std() * torch.randn_like(a) for on, a in zip(turned, start)]
@@ -331,7 +336,7 @@ def test_remainder_is_of_second_order_in_the_weights(run, kind):
             with torch.no_grad():
                 for a, first, da in zip(parameters(laws), start, direction):
                     a[:] = first + h * da
-                return segment_errors(laws, *run, cuts[:-1], cuts[1:]).loss.item()
+                return segment_errors(laws, *run, cuts[:-1], cuts[1:], recipe).loss.item()
 
         slope = sum((g * da).sum() for g, da in zip(slopes, direction)).item()
         assert rate(loss, slope, H) == pytest.approx(2.0, abs=0.1)

@@ -91,6 +91,14 @@ def test_a_training_says_what_its_errors_are_of(run):
     assert session.errors == {"errors": [session.history[0].error], "errors_of": "positions"}
 
 
+def test_checkpoints_of_before_go_on(run):
+    """A training without a term that is newer describes itself as before."""
+    plain, term = (json.loads(TrajectorySession(replace(SHORT, idempotence=weight), laws(),
+                                                *run).description) for weight in (0.0, 1e-3))
+    assert term == {**plain, "idempotence": 1e-3}
+    assert "idempotence" not in plain
+
+
 def first_gradients(recipe, laws, run):
     """Those that the first epoch steps with, and what it says."""
     session = TrajectorySession(recipe, laws, *run)

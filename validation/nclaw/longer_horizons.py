@@ -54,10 +54,14 @@ def longer_nets():
 
 @cache
 def longer_laws(name):
-    """Return the `LearnedLaws` of a name; raises as `trained_laws.trained`, and where they went on
-    from other weights than those that are there.
+    """Return the `LearnedLaws` of a name; raises as `continued_laws`."""
+    return continued_laws(name, longer_nets()[name])
+
+
+def continued_laws(name, net):
+    """Return the `LearnedLaws` of a `LawNet` that goes on; raises as `trained_laws.trained`, and
+    where they went on from other weights than those that are there.
     """
-    net = longer_nets()[name]
     laws = stored(name, identity(net))
     start = laws.about.get("start_sha256")      # of trainings since it is noted
     if start is not None and start != file_digest(net.start):

@@ -39,11 +39,13 @@ class LawNet(NamedTuple):
     velocity: float = 0.0           # weight of velocities in the loss [s^2]
     first: int = 25                 # horizon of the teacher [steps]
     last: int = 200
+    idempotence: float = 0.0        # weight of a second return in the loss [m^2]
     start: str = ""                 # name of the weights from which it goes on; "": drawn
 
 
 # Part of the identity where they are not as by default.
-LATER = ("method", "elastic_rate", "plastic_rate", "velocity", "first", "last", "start")
+LATER = ("method", "elastic_rate", "plastic_rate", "velocity", "first", "last", "idempotence",
+         "start")
 TRUE_LAWS = {   # environment -> its law and flow; fluids keep F = J^(1/3) I
     "jelly": ("FixedCorotated", "NoFlow"), "sand": ("Hencky", "DruckerPrager"),
     "plasticine": ("Hencky", "VonMises"), "water": ("Fluid", "FluidProjection")}

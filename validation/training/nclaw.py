@@ -23,6 +23,7 @@ from mpm_ref.scene import build
 from ..nclaw import bundle
 from ..nclaw.dough import DoughNet, doughs
 from ..nclaw.environments import environment, trajectory
+from ..nclaw.idempotence import idempotent_nets
 from ..nclaw.longer_horizons import longer_nets
 from ..nclaw.seeds import seed_nets
 from ..nclaw.simulators import GraphNet, framed_run, scenes_of
@@ -42,7 +43,7 @@ from .dough import filmed_laws
 from .small import bundled
 
 LAW_OPTIONS = ("epochs", "elastic_rate", "plastic_rate", "reading", "seed", "velocity", "first",
-               "last")
+               "last", "idempotence")
 KEEP_ALL, KEEP_EVERY = 200, 25      # longest segments of which all states are kept, and how many of
                                     # longer ones [steps]
 GRAPH_OPTIONS = ("steps", "width", "batch", "noise", "first_rate", "last_rate", "seed")
@@ -150,7 +151,8 @@ def main(names: Names = None, folder: Folder = FOLDER, checkpoints: Checkpoints 
         else:
             write(path, trained_laws(name, net, checkpoints, threads))
 
-    all_nets = {**nets(), **seed_nets(), **longer_nets(), **small_nets(), **doughs()}
+    all_nets = {**nets(), **seed_nets(), **longer_nets(), **idempotent_nets(), **small_nets(),
+                **doughs()}
     train_all(names, all_nets, (folder, checkpoints), threads, make)
 
 

@@ -50,10 +50,11 @@ class TrajectorySession(TrainingSession):
     @property
     def description(self):
         """Return the settings, what is trained and on what, as one line of text; without those with
-        which only time, memory and round-off change.
+        which only time, memory and round-off change, and without a term of the loss that is not in
+        it (checkpoints of before do not know `idempotence`).
         """
         recipe = {name: value for name, value in asdict(self.recipe).items()
-                  if name not in ("batch", "keep_every")}
+                  if name not in ("batch", "keep_every") and (name != "idempotence" or value)}
         if self.recipe.velocity:        # an error without a name has velocities in it
             recipe["errors_of"] = self.errors_of
         return json.dumps({"format": FORMAT, **recipe, "laws": [*map(describe, self.laws)],

@@ -48,7 +48,8 @@ class Recipe:
     at least every `keep_every`-th of their states and computes others anew, which affects memory,
     time and round-off. `seed` is that of the laws' start, and of the order of pairs (see
     `labeled`). `velocity` [s^2] weighs squared errors of velocities beside those of positions
-    (NCLAW-aux, printed without its value).
+    (NCLAW-aux, printed without its value). `idempotence` [m^2] weighs what a second return map
+    changes of F beside squared errors of positions: it is ours, and nothing for a projection.
     """
 
     epochs: int = 300
@@ -63,6 +64,7 @@ class Recipe:
     batch: int = 8
     keep_every: int = 1         # [steps]
     velocity: float = 0.0
+    idempotence: float = 0.0
 
     def __post_init__(self):
         for name in ("epochs", "first", "last", "batch", "keep_every"):
@@ -71,8 +73,9 @@ class Recipe:
         for name in ("elastic_rate", "plastic_rate", "clip", "scale"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected a positive number")
-        if not 0.0 <= self.velocity < float("inf"):
-            raise ValueError(f"velocity = {self.velocity}: expected a number >= 0")
+        for name in ("velocity", "idempotence"):
+            if not 0.0 <= getattr(self, name) < float("inf"):
+                raise ValueError(f"{name} = {getattr(self, name)}: expected a number >= 0")
         if not 0 <= self.seed < SEEDS:
             raise ValueError(f"seed = {self.seed}: expected 0 .. {SEEDS - 1}")
         if self.reading not in READINGS:

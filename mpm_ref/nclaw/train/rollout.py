@@ -49,8 +49,8 @@ def segment_errors(laws, world, observed, starts, ends, recipe=DEFAULT):
     over the steps of segments from time levels `starts` to later ones, `ends`.
 
     Segments that have ended go no further. In the loss the errors of velocities are added, times
-    the recipe's `velocity` [s^2]. Of the states the backward sweep keeps at least every
-    `keep_every`-th.
+    the recipe's `velocity` [s^2], and `second_return`, times its `idempotence` [m^2]. Of the states
+    the backward sweep keeps at least every `keep_every`-th.
     """
     levels, last = torch.tensor(starts), torch.tensor(ends)
     state, nodes = observed.states(levels), make_nodes(world, len(starts))
@@ -60,7 +60,7 @@ def segment_errors(laws, world, observed, starts, ends, recipe=DEFAULT):
     while len(levels):
         count = int((last - levels).min())
         count = min(count, recipe.keep_every) if anew else count
-        part = partial(run_part, (laws, world, observed, recipe.velocity), nodes, levels, count)
+        part = partial(run_part, (laws, world, observed, recipe), nodes, levels, count)
         total, positions, *state = (checkpoint(part, total, positions, *state, use_reentrant=True)
                                     if anew else part(total, positions, *state))
         positions, levels = positions.detach(), levels + count
@@ -72,13 +72,22 @@ def segment_errors(laws, world, observed, starts, ends, recipe=DEFAULT):
 
 def run_part(terms, nodes, levels, count, total, positions, *state):
     """Advance a state at time levels by `count` steps; return both sums, with the errors after each
-    step added, and the state. terms: laws, world, observation and weight of velocities [s^2].
+    step added, and the state. terms: laws, world, observation and recipe.
     """
-    laws, world, observed, velocity = terms
+    laws, world, observed, recipe = terms
     for k in range(1, count + 1):
         state = step(laws, world, state, nodes)
         off = observed.squared_error("x", state[0], levels + k)
         total, positions = total + off, positions + off.detach()
-        if velocity:
-            total = total + velocity * observed.squared_error("v", state[1], levels + k)
+        if recipe.velocity:
+            total = total + recipe.velocity * observed.squared_error("v", state[1], levels + k)
+        if recipe.idempotence:
+            total = total + recipe.idempotence * second_return(laws.plastic, state[3])
     return total, positions, *state
+
+
+def second_return(law, F):
+    """Return the squared change of F (b, n, d, d) in a return map, which has returned it before:
+    its mean over points and components, summed over runs. It is 0 of a projection.
+    """
+    return ((over_points(law, F) - F) ** 2).mean(dim=(1, 2, 3)).sum()
