@@ -9,6 +9,7 @@ from mpm_ref.rom.fields.elastic import ElasticMap, elastic_stress
 from mpm_ref.rom.fields.pod_fields import Sizes
 from mpm_ref.rom.study.run import RunOptions, ldm_run
 from validation.nsf import baseline
+from validation.nsf.errors import COLUMNS
 from validation.nsf.networks import nets, trained
 from validation.nsf.reduced_runs import fit_study
 from validation.nsf.studies import ball, bread, jelly, metal
@@ -71,3 +72,11 @@ def test_all_three_models_are_compared_on_the_same_tests():
     assert recorded["nsf.baseline.jelly.modes"][0] == pytest.approx(100.0 * modes)
     assert recorded["nsf.baseline.jelly.share"][0] == pytest.approx(nsf / ldm)
     assert {*baseline.SCENES} <= {name.split("-")[0] for name in nets()}
+
+
+def test_no_share_is_taken_of_an_error_of_a_run_that_broke_down():
+    def row(error):
+        return tuple(error if name == "origin" else 0.0 for name in COLUMNS)
+
+    assert baseline.share_of([row(0.01)], [row(0.02)]) == pytest.approx(0.5)
+    assert np.isnan(baseline.share_of([row(0.01)], [row(0.02), row(np.inf)]))
