@@ -53,7 +53,7 @@ def dough(run):
     noise of the camera alone. Keeps the points at the start, half-way and at the end.
     """
     laws = contestants(run)
-    runs = {name: {body: shots(scene(shape()), law) for body, shape in BODIES.items()}
+    runs = {name: {body: shots(scene(shape()), law).x for body, shape in BODIES.items()}
             for name, law in run.progress(laws.items(), "laws")}
     truth = runs["true"]
     marks = observe(truth["block"])

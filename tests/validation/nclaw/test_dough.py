@@ -17,7 +17,7 @@ from validation.nclaw.states import shots
 @pytest.fixture(scope="module")
 def truth():
     """True frames of the block."""
-    return shots(dough.scene(dough.block()), copy_body)
+    return shots(dough.scene(dough.block()), copy_body).x
 
 
 # The camera.
@@ -63,7 +63,7 @@ def test_the_body_has_fallen_half_a_metre():
 @pytest.mark.parametrize("shape", [dough.block, dough.star])
 def test_bodies_hit_the_floor_and_not_the_other_walls(shape):
     scene = dough.scene(shape())
-    x = shots(scene, copy_body)
+    x = shots(scene, copy_body).x
     wall = dough.WALL * dough.DX
     assert x[0, :, 1].min() > wall + dough.DX
     assert x[-1, :, 1].min() < wall
