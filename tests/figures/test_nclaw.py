@@ -208,9 +208,14 @@ def test_bodies_of_task_c_are_run_with_baselines(tmp_path, monkeypatch):
 
 
 def test_runs_that_broke_down_are_told(tmp_path):
-    notes = {}
+    notes, cached = {}, []
+
+    def make_and_note(name, make):
+        cached.append(name)
+        return make()
+
     run = SimpleNamespace(
-        experiment=SimpleNamespace(id="e"), folder=tmp_path, cached=lambda name, make: make(),
+        experiment=SimpleNamespace(id="e"), folder=tmp_path, cached=make_and_note,
         progress=lambda items, said: items,
         record=lambda target, value, note, **rule: notes.update({target: note}))
     x = np.zeros((2, 5, 3))
@@ -223,6 +228,7 @@ def test_runs_that_broke_down_are_told(tmp_path):
     assert [target for target, note in notes.items() if note.startswith(states.BROKEN)] == [
         "s.init", "e.a.init"]
     assert notes["e.a.init"] == f"{states.BROKEN}; init: step 7: gone"
+    assert cached == ["a: five points"]         # a run of other bodies is another part
     assert len(notes) == 4
 
 

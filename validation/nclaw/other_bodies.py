@@ -96,7 +96,7 @@ def show(run, parts):
     points = {}
     for name, (make, label) in run.progress(parts.items(), "runs"):
         try:
-            result = run.cached(name, make)
+            result = run.cached(f"{name}: {label}", make)
         except Untrained as fault:
             run.note(f"{name}: {fault}")
             continue

@@ -83,8 +83,8 @@ class LdmBaseline(NamedTuple):
                 yield level_of(state.t / test.dt), state.latent.xhat
 
         path = path_errors(ElasticMap(g, full.law), history_reference(test), states())
-        return RunErrors(path.errors, stress_share(path.stress), float(np.mean(points)), count,
-                         np.nan)
+        mean_points = np.nan if path.breakdown else float(np.mean(points))
+        return RunErrors(path.errors, stress_share(path.stress), mean_points, count, np.nan)
 
 
 def map_of(scene, g):
@@ -124,7 +124,7 @@ def record_scene(run, name, one, model):
     count = one.study.samples
     rows = {word: error_rows(studies[word], f"{name}.{word}", count, (0,)) for word in MODELS}
     for word, note in MODELS.items():
-        target, rule = ((f"nsf.{name}.baseline_error", {}) if word == "ldm" else
+        target, rule = ((f"nsf.{name}.baseline_error.positions", {}) if word == "ldm" else
                         (f"nsf.baseline.{name}.{word}", {"comparator": "info"}))
         record_mean(run, target, rows[word], one.size, f"{count} samples", fields=note, **rule)
         run.record(f"nsf.baseline.{name}.{word}.stress", 100.0 * mean(rows[word], "stress"),

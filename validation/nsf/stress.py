@@ -16,7 +16,7 @@ and the same stress has a distance from that of a full run with steps half as lo
 
 import numpy as np
 
-from mpm_ref.rom.study.baselines import interpolation_weights
+from mpm_ref.rom.study.baselines import EVEN, interpolation_weights
 from mpm_ref.rom.study.dataset import simulate_history
 from mpm_ref.rom.study.evaluate import (
     history_reference,
@@ -40,7 +40,6 @@ FIGURE = "metal"        # scene of Figure 9
 SHADE = 0.1             # of the range of colours
 MOST_POINTS = 95        # of 100, that a picture shows
 TWICE = 2.0             # the fields' own error, which a run should not exceed
-FIELDS = "networks", "modes"
 LOOKUPS = NEAREST, INTERPOLATED
 TRAINING, FULL = "training", "full"     # where a row is of no reduced run
 PARTS = {
@@ -50,7 +49,7 @@ PARTS = {
     "coordinates": "the fields at the coordinates nearest to the full run's positions",
     "unsmoothed": "likewise, of modes whose coefficients are not smoothed",
     "samples": "reduced runs on the study's samples",
-    "all": "reduced runs on all particles",
+    "all": "reduced runs on modes with all particles as samples",
     "refined": "of the full run, by one of steps half as long"}
 COLUMNS = ("scene", "test", "fields", "part", "stress")
 
@@ -58,33 +57,44 @@ COLUMNS = ("scene", "test", "fields", "part", "stress")
 @experiment("nsf.stress", title="NSF: the stress of reduced runs, beside training runs",
             profiles=("quick", "standard"), budget={"quick": 60, "standard": 1200})
 def compare_stress(run):
-    """Record the parts of the error of the stress, on networks and on modes, and that of training
-    runs in their place; one draw of samples, every second test.
+    """Record the parts of the error of the stress, on modes and, on the grid of their training, on
+    networks, and that of training runs in their place; one draw of samples, every second test.
     """
     rows = []
     for name in run.progress(run.choose(quick=(FIGURE,), standard=tuple(STUDIES)), "scenes"):
-        one, model = fit_study(study_of(run, name)), trained(f"{name}-waves")
-        networks = one._replace(fields=fields_of(model, one.study), xhat=model.xhat)
-        pair = dict(zip(FIELDS, (networks, one), strict=True))
-        own = [(name, *row) for row in scene_rows(pair)]
-        record_parts(run, f"nsf.stress.{name}", own, one, model)
+        studies = {"modes": fit_study(study_of(run, name))}
+        if run.profile == "standard":
+            studies["networks"] = on_networks(run, name, studies["modes"])
+        own = [(name, *row) for row in scene_rows(studies)]
+        record_parts(run, f"nsf.stress.{name}", own, studies)
         rows += own
         if name == FIGURE:
-            record_colours(run, pair)
+            record_colours(run, studies)
     run.table("parts", COLUMNS, rows)
 
 
-def record_parts(run, target, rows, one, model):
-    """Record the means of a scene's rows, and the error of runs over those of training runs."""
+def on_networks(run, name, one):
+    """Return a `FittedStudy` with the trained networks of its scene as fields; record the error of
+    their stress on the training.
+    """
+    model = trained(f"{name}-waves")
+    run.record(f"nsf.stress.{name}.networks.snapshots", 100.0 * model.about["errors"]["stress"],
+               unit="%", comparator="info", scale=one.scale,
+               note="of the networks at their own training snapshots, as stored with them")
+    return one._replace(fields=fields_of(model, one.study), xhat=model.xhat)
+
+
+def record_parts(run, target, rows, studies):
+    """Record the means of a scene's rows, and the error of runs over those of training runs.
+    studies: {fields: `FittedStudy`} of the rows.
+    """
+    one = studies["modes"]
     parts = dict.fromkeys(row[2:4] for row in rows)
     means = {part: np.mean([row[-1] for row in rows if row[2:4] == part]) for part in parts}
     for (fields, part), value in means.items():
         run.record(f"{target}.{fields}.{part}", 100.0 * value, unit="%", comparator="info",
                    scale=one.scale, note=f"{PARTS[part]}; Kirchhoff stress over its norm")
-    run.record(f"{target}.networks.snapshots", 100.0 * model.about["errors"]["stress"], unit="%",
-               comparator="info", scale=one.scale,
-               note="of the networks at their own training snapshots, as stored with them")
-    for fields in FIELDS:
+    for fields in studies:
         for lookup in LOOKUPS:
             run.record(f"{target}.{fields}.over.{lookup}",
                        means[fields, "samples"] / means[TRAINING, lookup], comparator="<=",
@@ -97,11 +107,11 @@ def record_parts(run, target, rows, one, model):
                    "than the fields lack")
 
 
-def record_colours(run, pair):
+def record_colours(run, studies):
     """Record how far the colours of Figure 9 are off: the size of the stress at some times, in the
     first test, over its range; below a tenth at 95 of 100 points the two pictures look alike.
     """
-    for fields, one in pair.items():
+    for fields, one in studies.items():
         run.record(f"nsf.stress.{FIGURE}.{fields}.colours", colour_error(one, one.study.test[0]),
                    comparator="<=", bound=SHADE, scale=one.size, note="|| tau | - | tau' || over "
                    "the largest | tau' |, that which 95 of 100 points do not exceed; Figure 9 says "
@@ -110,7 +120,7 @@ def record_colours(run, pair):
 
 def colour_error(one, value):
     """Return the difference of sizes of the stress that few points of a `FittedStudy`'s reduced run
-    exceed, at the times of figures, over the largest size of a test; NaN where the run breaks down.
+    exceed, at the times of figures, over the largest size then; NaN where the run breaks down.
     """
     points = np.arange(len(one.runs.X))
     ours = run_points("run", one, value, points)["run_tau"]
@@ -118,27 +128,31 @@ def colour_error(one, value):
     return float(np.percentile(np.abs(ours - true), MOST_POINTS) / true.max())
 
 
-def scene_rows(pair):
+def scene_rows(studies):
     """Yield rows of COLUMNS without the scene, of {fields: `FittedStudy`} on the same runs."""
-    one = pair["modes"]
+    one = studies["modes"]
     sharp = refit(one, one.study.sizes._replace(smoothing=SHARP), one.study.follows)
     for value in one.study.test[::EVERY]:
-        for lookup, tau in lookup_stresses(one.runs, value).items():
-            yield value, TRAINING, lookup, history_error(tau, one.tests[value].tau[0])
+        for lookup, error in lookup_errors(one.runs, value, one.tests[value].tau[0]).items():
+            yield value, TRAINING, lookup, error
         yield value, "modes", "projection", projection_error(one, value)
         yield value, "modes", "unsmoothed", nearest_error(sharp, value)
         yield value, "modes", "all", one.errors(value, len(one.runs.X)).stress
-        for fields, own in pair.items():
+        for fields, own in studies.items():
             yield value, fields, "coordinates", nearest_error(own, value)
             yield value, fields, "samples", own.errors(value, one.study.samples).stress
-    yield value, FULL, "refined", refined_error(one, value)
+        yield value, FULL, "refined", refined_error(one, value)
 
 
-def lookup_stresses(runs, value):
-    """Return {lookup: stresses (k + 1, n, 6) [Pa]} of training runs in place of a test's."""
-    nearest = int(np.argmin(np.abs(runs.mu[:, 0] - value)))
+def lookup_errors(runs, value, reference):
+    """Return {lookup: error} of training runs in place of a test with stresses (k + 1, n, 6) [Pa];
+    of several that are equally near the least.
+    """
+    off = (runs.mu[:, 0] - value) ** 2
     weights = interpolation_weights(runs.mu, np.array([value]))
-    return {NEAREST: runs.tau[nearest], INTERPOLATED: weighted_sum(weights, runs.tau)}
+    return {NEAREST: min(history_error(runs.tau[k], reference)
+                         for k in np.flatnonzero(off <= off.min() + EVEN)),
+            INTERPOLATED: history_error(weighted_sum(weights, runs.tau), reference)}
 
 
 def history_error(tau, reference):

@@ -31,6 +31,7 @@ from .size_model import (
     fit_step,
     fit_tried,
     fit_windows,
+    last_size,
 )
 from .size_timing import (
     carried_models,
@@ -65,6 +66,7 @@ class SizeNeeded(NamedTuple):
     equal_full: float       # as cheap as the full-order run within the error
     gain_full: float        # GAIN times as cheap
     equal: float            # ... as the cheapest rival, on any grid
+    until: float            # up to which it is as cheap; 0: at none
     gain: float
     equal_steps: float      # ... without what is read from states
     best: float             # largest gain beside the cheapest rival
@@ -105,8 +107,10 @@ def compare(run):
                                for (dx, name), cpu in timed.reads.items()])
     if run.profile == "standard":
         rivals = rivals_of(run, timed, steps, reads)
+        costs = run_costs(rivals, steps, reads)
         record_whole_runs(run, rivals, check)
-        record_sizes(run, rivals, run_costs(rivals, steps, reads))
+        record_gains(run, rivals, costs)
+        record_sizes(run, rivals, costs)
 
 
 # Times.
@@ -231,6 +235,26 @@ def record_whole_runs(run, rivals, check):
     run.table("runs", RUNS, rows)
 
 
+def record_gains(run, rivals, costs):
+    """Record the time of the full run over that of a reduced one, as `trade.reduced` has them, over
+    the predicted gain: that of the size with the largest misfit.
+    """
+    table = ProfileResults(RESULTS / "standard").table("trade.reduced", "methods")
+    N, method, cpu = (table[name] for name in ("particles", "method", "cpu_run"))
+    for name in REDUCED:
+        own = N[method == name]
+        gains = cpu[(method == "full.apic") & np.isin(N, own)] / cpu[method == name]
+        predicted = rivals.full.seconds(own) / costs[name].seconds(own)
+        ratios = gains / predicted
+        run.record(f"trade.reduced-size.{name}.gain-measured",
+                   float(ratios[np.argmax(np.abs(np.log(ratios)))]), unit="1", comparator="band",
+                   bound=(1.0 / FACTOR, FACTOR), scale="the sizes of `trade.reduced`",
+                   note="CPU time of the full run over that of a reduced one, over the predicted "
+                   "gain, where it is farthest off: " + "; ".join(
+                       f"{one:.3g} over {other:.3g} at {n:.0f} particles"
+                       for n, one, other in zip(own, gains, predicted, strict=True)))
+
+
 # Sizes.
 
 def run_costs(rivals, steps, reads):
@@ -270,22 +294,25 @@ def size_needed(method, error, rivals, cost):
             / cost._replace(read=0.0).seconds(SIZES))
     at = int(np.argmax(best))
     N = rivals.volume * (rivals.error.B / error) ** (3.0 / rivals.error.p)
-    return SizeNeeded(method, error, first_size(SIZES, full, 1.0), first_size(SIZES, full, GAIN),
-                      first_size(SIZES, best, 1.0), first_size(SIZES, best, GAIN),
-                      first_size(SIZES, bare, 1.0), float(best[at]), float(SIZES[at]),
-                      float(cost.step.seconds(SIZES[-1] / cost.coarser**3)),
-                      float(rivals.full.seconds(N)))
+    return SizeNeeded(
+        method, error, first_size(SIZES, full, 1.0), first_size(SIZES, full, GAIN),
+        first_size(SIZES, best, 1.0), last_size(SIZES, best, 1.0), first_size(SIZES, best, GAIN),
+        first_size(SIZES, bare, 1.0), float(best[at]), float(SIZES[at]),
+        float(cost.step.seconds(SIZES[-1] / cost.coarser**3)), float(rivals.full.seconds(N)))
 
 
 def record_size(run, one, word):
     """Record the largest gain of a `SizeNeeded`."""
-    def text(size):
-        return f"from {size:.2g} particles on" if np.isfinite(size) else "never"
+    def text(size, until=0.0):
+        if np.isfinite(size):
+            return f"from {size:.2g} particles on"
+        return f"up to {until:.2g} particles" if until else "never"
 
     run.record(f"trade.reduced-size.{one.method}.gain{word}", one.best, unit="x",
                comparator="info", scale=f"{SIZES[0]:.0e} to {SIZES[-1]:.0e} particles, predicted",
                note=f"largest, at {one.best_at:.2g} particles, with an error of "
                f"{100.0 * one.error:.3g} %; as cheap as the cheapest other run within it: "
-               f"{text(one.equal)} ({text(one.equal_steps)} without reading all points), {GAIN:g} "
+               f"{text(one.equal, one.until)} ({text(one.equal_steps)} without reading all "
+               f"points), {GAIN:g} "
                f"times as cheap: {text(one.gain)}; as the full-order run: {text(one.equal_full)} "
                f"and {text(one.gain_full)}")

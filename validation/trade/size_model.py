@@ -182,3 +182,8 @@ def first_size(N, gain, least):
     below = np.flatnonzero(~(gain >= least))
     first = below[-1] + 1 if len(below) else 0
     return float(N[first]) if first < len(N) else np.inf
+
+
+def last_size(N, gain, least):
+    """Return the largest of sizes N (k,) at which a gain (k,) is at least so large; 0 if none."""
+    return float(np.max(N[gain >= least], initial=0.0))

@@ -67,8 +67,8 @@ def test_all_three_models_are_compared_on_the_same_tests():
     rows = baseline.record_scene(Run(), "jelly", fit_study(study), trained("jelly-waves"))
     assert [row[:3] for row in rows] == [(f"jelly.{word}", VALUE, 40) for word in baseline.MODELS]
     ldm, nsf, modes = (row[5] for row in rows)
-    assert recorded["nsf.jelly.baseline_error"][0] == pytest.approx(100.0 * ldm)
-    assert "comparator" not in recorded["nsf.jelly.baseline_error"][1]
+    assert recorded["nsf.jelly.baseline_error.positions"][0] == pytest.approx(100.0 * ldm)
+    assert "comparator" not in recorded["nsf.jelly.baseline_error.positions"][1]
     assert recorded["nsf.baseline.jelly.modes"][0] == pytest.approx(100.0 * modes)
     assert recorded["nsf.baseline.jelly.share"][0] == pytest.approx(nsf / ldm)
     assert {*baseline.SCENES} <= {name.split("-")[0] for name in nets()}

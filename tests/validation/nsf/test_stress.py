@@ -27,10 +27,12 @@ def share(tau, reference):
 
 def test_training_runs_are_taken_as_they_are_and_between(one):
     tau, reference = one.runs.tau.astype(float), one.tests[VALUE].tau[0].astype(float)
-    found = stress.lookup_stresses(one.runs, VALUE)
-    np.testing.assert_array_equal(found["nearest"], one.runs.tau[1])
-    np.testing.assert_allclose(found["interpolated"], 0.25 * tau[0] + 0.75 * tau[1])
-    assert stress.history_error(tau[1], reference) == pytest.approx(share(tau[1], reference))
+    found = stress.lookup_errors(one.runs, VALUE, reference)
+    assert found["nearest"] == pytest.approx(share(tau[1], reference))
+    between = 0.25 * tau[0] + 0.75 * tau[1]
+    assert found["interpolated"] == pytest.approx(share(between, reference), rel=1e-5)
+    even = stress.lookup_errors(one.runs, 0.4, reference)["nearest"]
+    assert even == pytest.approx(min(share(run, reference) for run in tau))
 
 
 def test_no_coefficients_of_the_modes_come_nearer_than_the_projection(one):
@@ -62,7 +64,7 @@ def test_steps_half_as_long_end_at_the_same_times(one, monkeypatch):
 
 
 def test_runs_are_judged_beside_training_runs(one):
-    recorded, model = {}, trained("jelly-waves")
+    recorded = {}
 
     class Run:
         def record(self, target, value, **rule):
@@ -73,7 +75,10 @@ def test_runs_are_judged_beside_training_runs(one):
              ("modes", "coordinates"): (0.1, 0.1), ("modes", "samples"): (0.2, 0.1)}
     rows = [("jelly", test, *part, own) for part, both in parts.items()
             for test, own in enumerate(both)]
-    stress.record_parts(Run(), "nsf.stress.jelly", rows, one, model)
+    studies = {"modes": one, "networks": stress.on_networks(Run(), "jelly", one)}
+    stress.record_parts(Run(), "nsf.stress.jelly", rows, studies)
+    assert recorded["nsf.stress.jelly.networks.snapshots"][0] == pytest.approx(
+        100.0 * trained("jelly-waves").about["errors"]["stress"])
     assert recorded["nsf.stress.jelly.networks.over.nearest"] == (pytest.approx(1.5), 1.0)
     assert recorded["nsf.stress.jelly.modes.over.interpolated"] == (pytest.approx(1.5), 1.0)
     assert recorded["nsf.stress.jelly.networks.over.coordinates"] == (pytest.approx(2.25), 2.0)

@@ -5,6 +5,7 @@ those at which costs cross.
 import numpy as np
 import pytest
 
+from validation.trade import reduced_size
 from validation.trade.arm import draws
 from validation.trade.reduced_size import size_needed
 from validation.trade.size_model import (
@@ -21,6 +22,7 @@ from validation.trade.size_model import (
     fit_step,
     fit_tried,
     fit_windows,
+    last_size,
 )
 from validation.trade.size_timing import carried_models, small_models, steppers
 
@@ -76,6 +78,8 @@ def test_the_first_size_is_the_one_from_which_on_a_gain_stays():
     assert first_size(sizes, np.array([2.0, 0.5, 1.0, 3.0]), 1.0) == 3.0
     assert first_size(sizes, np.array([2.0, 2.0, 2.0, 2.0]), 1.0) == 1.0
     assert first_size(sizes, np.array([2.0, 2.0, 2.0, 0.9]), 1.0) == np.inf
+    assert last_size(sizes, np.array([2.0, 0.5, 2.0, 0.9]), 1.0) == 3.0
+    assert last_size(sizes, np.array([0.2, 0.5, 0.2, 0.9]), 1.0) == 0.0
 
 
 def test_the_cheapest_rival_is_the_coarsest_grid_within_the_error():
@@ -94,6 +98,37 @@ def test_a_constant_step_is_cheaper_than_the_full_run_but_not_than_a_coarse_one(
     assert (found.equal, found.gain, found.equal_steps) == (np.inf, np.inf, np.inf)
     assert found.best < 1.0
     assert found.rival_limit > rivals().cheapest(1e9, 0.05)
+
+
+def test_measured_gains_are_compared_where_they_are_farthest_off(monkeypatch):
+    """The full run costs 1e-6 N^(4/3); by half as much and by twice as much at the two sizes."""
+    sizes = [8000, 27000]
+    predicted = {n: 1e-6 * n ** (4 / 3) for n in sizes}
+    methods = ["full.apic", *reduced_size.REDUCED]
+    cpu = [(1.0 if name == "full.apic" else off) * predicted[n]
+           for n, off in zip(sizes, (1.1, 2.0), strict=True) for name in methods]
+    table = {"particles": np.repeat(sizes, len(methods)), "method": np.array(2 * methods),
+             "cpu_run": np.array(cpu)}
+    recorded = {}
+
+    class Results:
+        def __init__(self, folder):
+            pass
+
+        def table(self, *names):
+            return table
+
+    class Run:
+        def record(self, target, value, **rule):
+            recorded[target] = value, rule
+
+    monkeypatch.setattr(reduced_size, "ProfileResults", Results)
+    full = ArmRunCost(FULL, 5.0)
+    reduced_size.record_gains(Run(), rivals(), dict.fromkeys(reduced_size.REDUCED, full))
+    value, rule = recorded["trade.reduced-size.nsf.few.gain-measured"]
+    assert value == pytest.approx(0.5)
+    assert rule["bound"] == (1.0 / 1.3, 1.3)
+    assert "0.909 over 1 at 8000 particles; 0.5 over 1 at 27000" in rule["note"]
 
 
 def test_carried_models_step_as_full_runs_do():
