@@ -16,7 +16,7 @@ from mpm_ref.store.text import counted
 
 from ..common.even_points import even_subset
 from ..common.registry import experiment
-from ..common.scenes import evenly
+from ..common.scenes import catalogue_scene, evenly
 from ..ldm.published_bodies import keep
 from .real_bodies import BODIES, bodies_text, with_real_bodies
 from .run_history import COLUMNS, run_history, unpublished
@@ -27,6 +27,7 @@ ROWS = 500          # of the table, at most
 MOST = 20_000       # particles that are kept for pictures
 COLOURED = ("wheel",)       # scenes whose pictures show the stress
 PATIENCE = 3600     # CPU seconds of a whole run, at most, unless it is of the printed size
+PRINTED_ENDS = {"boxes": 0.5}   # [s] of motion at the printed size, where all of it takes hours
 
 
 def scene_experiment(scene, seconds, quick=None):
@@ -41,7 +42,8 @@ def scene_experiment(scene, seconds, quick=None):
                 profiles=profiles, budget={"quick": 6, "standard": seconds, "paper": 1e5})
     def whole_run(run):
         """Run the scene and record the work of its steps."""
-        end = run.choose(quick={"end": quick}, standard={}, paper={})
+        printed = {"end": PRINTED_ENDS[scene]} if scene in PRINTED_ENDS else {}
+        end = run.choose(quick={"end": quick}, standard={}, paper=printed)
         size, patience = run.choose(quick=("quick", PATIENCE), standard=("standard", PATIENCE),
                                     paper=("paper", inf))
         record = sized(f"hot_{scene}", size, unstable="allow", **end)
@@ -68,6 +70,7 @@ def record_run(run, name, scene, patience):
     history = run_history(scene, file, patience, with_states=is_measured(run, name))
     run.table("steps", COLUMNS, history.steps[evenly(len(history.steps), ROWS)].tolist())
     record_end(run, name, history)
+    record_beginning(run, name, history)
     record_cost(run, name, history)
     keep_states(run, history, stress=name in COLOURED)
 
@@ -111,6 +114,15 @@ def record_end(run, name, history):
     run.record(f"{id}.converged", float(history.column("converged").mean()), unit="1",
                comparator="=", paper=1.0, scale=scale,
                note=f"share of the steps that met eps = {eps:g}")
+
+
+def record_beginning(run, name, history):
+    """Record how much of the scene's motion a run was asked for, where it is not all."""
+    asked, whole = history.facts["end"], catalogue_scene(f"hot_{name}").end
+    if asked < whole:
+        run.record(f"hot.scenes.{name}.asked", asked / whole, unit="1", comparator="info",
+                   scale=scale_text(history), note=f"share of the scene's {whole:.3g} s that this "
+                   "run was asked for; `done` is the share of what was asked")
 
 
 def record_cost(run, name, history):

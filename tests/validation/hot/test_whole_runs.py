@@ -122,6 +122,16 @@ def test_broken_run_is_stored_with_its_reason():
     assert history.times[-1] > 0.0
 
 
+@pytest.mark.parametrize("share", [None, 0.25])
+def test_a_run_of_the_beginning_says_so(history, share):
+    rows = {}
+    run = SimpleNamespace(record=lambda id, value, **notes: rows.update({id: value}))
+    whole = catalogue_scene("hot_faceless").end
+    whole_runs.record_beginning(run, "faceless", history._replace(
+        facts={**history.facts, "end": whole * (share or 1.0)}))
+    assert rows == ({"hot.scenes.faceless.asked": share} if share else {})
+
+
 def test_every_scene_has_a_whole_run():
     experiments = {id for id in discover().experiments if id.startswith("hot.scenes.")}
     assert experiments - {real_counts.ID} == {name.replace("hot_", "hot.scenes.") for name in SIZES}
