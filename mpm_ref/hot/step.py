@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.grid import Storage
+from ..core.heap import keep_freed_memory
 from ..core.mls_slopes import mls_stencil
 from ..core.state import Grid
 from ..explicit import Stepper, scatter
 from .constraints import ActiveSet
-from .heap import keep_freed_memory
 from .methods import SolverOptions, minimise
 from .multigrid.geometric import CoarseGrids, coarse_conditions
 from .norms import characteristic_norms

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..body import Body, particles_at
 from ..core.grid import OutOfRange, Storage, update
+from ..core.heap import keep_freed_memory
 from ..explicit import Scheme, gather, scatter
 from ..materials import NoFlow
 from .fields import ReducedField
@@ -92,6 +93,7 @@ class ReducedStepper:
         if self.has_gradient and self.velocity != "previous":
             raise ValueError(f"velocity = {self.velocity!r} with transfer {self.transfer!r}: "
                              "expected 'previous', whose gradient is known")
+        keep_freed_memory()
         self.scheme = Scheme(self.quadrature.degree, self.transfer)
         self.storage = Storage(self.quadrature.dx, self.scheme.stencil, d)
 

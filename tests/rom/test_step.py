@@ -12,6 +12,7 @@ from rom_toys import cloud, decoder
 from mpm_ref.body import Body, particles_at
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, NoFlow
+from mpm_ref.rom import step
 from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.fields.elastic import ElasticMap
 from mpm_ref.rom.fields.pod import modes
@@ -97,6 +98,13 @@ def reduced_steps(model, latent, count, steps=STEPS):
         latent, report = model.step(latent, chosen(rng), k * DT, DT)
         assert report.rank == model.field.r
     return latent
+
+
+def test_a_reduced_run_keeps_the_memory_that_it_frees(monkeypatch):
+    asked, X = [], np.random.default_rng(1).uniform(size=(9, 2))
+    monkeypatch.setattr(step, "keep_freed_memory", lambda: asked.append(True))
+    ldm_stepper(Affine(2), lagrangian(X, *weights(9, 2), DX, 2), LAW, GRAVITY[:2])
+    assert asked == [True]
 
 
 def moving(xhat, vhat):

@@ -2,10 +2,11 @@
 
 The true return maps are projections: a second one changes nothing. Nothing in the printed training
 asks that of the learned one, which returns a part of a strain in each step, and the stress is
-learned for the F that it leaves: so both belong to the time step of training. The variant goes on
-from the printed training with `Recipe.idempotence` times the mean squared change of F in a second
-return in its loss; beside it stands a training that goes on alike without the term. Each is a file
-of weights, remade by `python -m validation.training.nclaw NAME`.
+learned for the F that it leaves: so both belong to the time step of training. The variants have
+`Recipe.idempotence` times the mean squared change of F in a second return in their loss: one is the
+printed training with the term from its first epoch on; the other goes on from the printed training,
+beside one that goes on alike without the term. Each is a file of weights, remade by
+`python -m validation.training.nclaw NAME`.
 """
 
 from functools import cache, partial
@@ -33,8 +34,9 @@ from .longer_horizons import continued_laws
 from .printed_ids import error_id
 from .trained_laws import nets, trained
 
-WEIGHTS = {"again": 0.0, "idempotent": 0.3}      # [m^2], of the term
-NAMES = ("water",)      # environments of which the variant is trained
+TERM = 0.3              # weight of the term [m^2]
+VARIANTS = "again", "idempotent", "idempotent-start"
+NAMES = ("water",)      # environments of which the variants are trained
 SCHEDULE = {"epochs": 24, "first": 50, "last": 200, "elastic_rate": 0.3, "plastic_rate": 0.03}
 FACTORS = 0.5, 2.0      # times the step of training
 SHEAR = 1e-3            # size of what is added to F, over that of F
@@ -52,9 +54,15 @@ class Returns(NamedTuple):
 
 
 def idempotent_nets():
-    """Return {name: `LawNet`} of the trainings with the term and of those without it."""
-    return {f"{name}-{word}": nets()[name]._replace(start=name, idempotence=weight, **SCHEDULE)
-            for name in NAMES for word, weight in WEIGHTS.items()}
+    """Return {name: `LawNet`} of the trainings of `VARIANTS`."""
+    return {f"{name}-{word}": nets()[name]._replace(**changes) for name in NAMES
+            for word, changes in zip(VARIANTS, changes_of(name), strict=True)}
+
+
+def changes_of(name):
+    """Return what each of `VARIANTS` changes in the printed training of an environment."""
+    on = {"start": name, **SCHEDULE}
+    return on, {**on, "idempotence": TERM}, {"idempotence": TERM}
 
 
 @cache
@@ -66,7 +74,7 @@ def idempotent_laws(name):
 @experiment("nclaw.idempotence", title="NCLaw: a return map that a second one does not change",
             profiles=("quick", "standard"), budget={"quick": 30, "standard": 600})
 def idempotence(run):
-    """Record errors of both trainings in the same runs, and what their return maps do."""
+    """Record errors of all trainings in the same runs, and what their return maps do."""
     laws = available_laws(run)
     tasks = run.choose(quick=("reconstruction",),
                        standard=("reconstruction", "time", "velocity"))
@@ -88,7 +96,7 @@ def available_laws(run):
     printed = load_available(run, NAMES, trained)
     later = load_available(run, idempotent_nets(), idempotent_laws)
     by_method = {OURS: printed, **{word: {name: later[f"{name}-{word}"] for name in NAMES
-                                          if f"{name}-{word}" in later} for word in WEIGHTS}}
+                                          if f"{name}-{word}" in later} for word in VARIANTS}}
     return {method: laws for method, laws in by_method.items() if laws}
 
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from mpm_ref.core.heap import keep_freed_memory
 from mpm_ref.core.jit import set_threads
-from mpm_ref.hot.heap import keep_freed_memory
 from mpm_ref.rom.study.full_model import ldm_full_model
 
 from ..common.registry import experiment

@@ -10,7 +10,8 @@ from validation.nclaw.dissipation import TRUE, MaterialLaws
 from validation.nclaw.errors import ErrorRow
 from validation.nclaw.idempotence import (
     NAMES,
-    WEIGHTS,
+    TERM,
+    VARIANTS,
     Returns,
     idempotent_nets,
     material_laws,
@@ -25,16 +26,15 @@ from validation.nclaw.trained_laws import identity, nets
 
 def test_trainings_differ_by_the_term_alone():
     found = idempotent_nets()
-    assert len(found) == len(NAMES) * len(WEIGHTS)
+    assert len(found) == len(NAMES) * len(VARIANTS)
     for name in NAMES:
         again = found[f"{name}-again"]
         assert again.start == name
         assert "idempotence" not in identity(again)     # nor is it in that of older weights
-        for word, weight in WEIGHTS.items():
+        for word, without in (("idempotent", again), ("idempotent-start", nets()[name])):
             variant = found[f"{name}-{word}"]
-            assert variant == again._replace(idempotence=weight)
-            assert identity(variant) == identity(again) | ({"idempotence": weight} if weight
-                                                           else {})
+            assert variant == without._replace(idempotence=TERM)
+            assert identity(variant) == identity(without) | {"idempotence": TERM}
     assert not set(found) & set(nets())
 
 

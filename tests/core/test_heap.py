@@ -8,14 +8,14 @@ import sys
 import numpy as np
 import pytest
 
+from mpm_ref.core.heap import CHOSEN
 from mpm_ref.explicit import Scheme
 from mpm_ref.hot import step
-from mpm_ref.hot.heap import CHOSEN
 
 FAULTS = """
 import ctypes, resource
 import numpy as np
-from mpm_ref.hot.heap import keep_freed_memory
+from mpm_ref.core.heap import keep_freed_memory
 ctypes.CDLL(None).prctl(41, 1, 0, 0, 0)         # PR_SET_THP_DISABLE: small pages, to be counted
 kept = keep_freed_memory()
 for k in range(3):

@@ -1,7 +1,8 @@
-"""Memory that implicit steps free and ask for again: matrices of hundreds of megabytes.
+"""Memory that steps free and ask for again: matrices of implicit steps, and all that reduced steps
+with many points compute of them.
 
 By default the GNU C library returns large freed blocks to the operating system, which then clears
-their pages anew at the next step (decision 130 has times).
+their pages anew at the next step (decisions 130 and 138 have times).
 """
 
 import ctypes
