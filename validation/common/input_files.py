@@ -2,8 +2,9 @@
 
 An experiment depends on them as on its source. A file that an earlier experiment of the process
 opened counts too, since its content may be cached. Files that a library opens by itself (HDF5) are
-not noticed. The printed values in `validation/targets`, which some experiments compute with, and
-the random numbers count for every experiment.
+not noticed. Results of other experiments count where a module declares them. The printed values in
+`validation/targets`, which some experiments compute with, and the random numbers count for every
+experiment.
 """
 
 import hashlib
@@ -19,6 +20,7 @@ IGNORED = ("validation/targets/", "validation/templates/")      # rules and layo
 CODE = {".py", ".pyc", ".nbi", ".nbc"}
 
 _opened = set()         # paths as text
+_declared = set()       # relative paths
 
 
 def watch():
@@ -31,10 +33,21 @@ def _note(event, arguments):
         _opened.add(os.fspath(arguments[0]))
 
 
+def declare(path):
+    """Count a file as an input that lies outside of the folders of data files.
+
+    path: relative to the root of the repository, with slashes.
+    """
+    _declared.add(path)
+
+
 def opened(root=ROOT):
-    """Return {path relative to `root`: hash} of the data files that were opened and are there."""
+    """Return {path relative to `root`: hash} of the data files that were opened, or declared, and
+    are there.
+    """
     inside = {relative(path, root) for path in list(_opened)} - {None}
-    found = {path for path in inside if is_input(path) and (root / path).is_file()}
+    inputs = {path for path in inside if is_input(path)} | _declared
+    found = {path for path in inputs if (root / path).is_file()}
     return {path: hash_now(path, root) for path in sorted(found)}
 
 

@@ -17,6 +17,7 @@ from mpm_ref.core.heap import keep_freed_memory
 from mpm_ref.core.jit import set_threads
 from mpm_ref.rom.study.full_model import ldm_full_model
 
+from ..common.input_files import declare
 from ..common.registry import experiment
 from ..common.results import RESULTS, ProfileResults
 from .arm import ENDS, arm, draws, simulated
@@ -181,11 +182,19 @@ def record_step(run, row, is_sampled):
 
 # Errors.
 
+def measured_methods():
+    """Return the errors and times that `trade.reduced` has at standard, an input of this
+    experiment, as {column: array}.
+    """
+    declare("results/standard/trade.reduced.methods.csv")
+    return ProfileResults(RESULTS / "standard").table("trade.reduced", "methods")
+
+
 def rivals_of(run, timed, steps, reads):
     """Return the `Rivals`, with the errors of `trade.reduced`; record how far these are from the
     law of coarser grids.
     """
-    table = ProfileResults(RESULTS / "standard").table("trade.reduced", "methods")
+    table = measured_methods()
     size, n, method, error = (table[name] for name in ("size", "particles", "method", "error"))
     dx = np.array([GRIDS[one] for one in size])
     coarse = {name: float(name.split(".", 1)[1].rsplit(".", 1)[0]) if "coarse" in name else 1.0
@@ -239,7 +248,7 @@ def record_gains(run, rivals, costs):
     """Record the time of the full run over that of a reduced one, as `trade.reduced` has them, over
     the predicted gain: that of the size with the largest misfit.
     """
-    table = ProfileResults(RESULTS / "standard").table("trade.reduced", "methods")
+    table = measured_methods()
     N, method, cpu = (table[name] for name in ("particles", "method", "cpu_run"))
     for name in REDUCED:
         own = N[method == name]
@@ -270,7 +279,7 @@ def record_sizes(run, rivals, costs):
     """Record the largest gain of each method, with its smallest error and with ERROR where it has
     a larger one, and the sizes from which on it pays.
     """
-    table = ProfileResults(RESULTS / "standard").table("trade.reduced", "methods")
+    table = measured_methods()
     rows, curves = [], []
     for method, cost in costs.items():
         least = float(table["error"][table["method"] == method].min())

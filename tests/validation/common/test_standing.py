@@ -184,6 +184,16 @@ def test_data_files_that_are_opened_are_noted_with_their_hash(tmp_path):
                                 for file in ("scenes/a.toml", "validation/nsf/weights/b.npz")}
 
 
+def test_a_result_counts_where_it_is_declared(tmp_path, monkeypatch):
+    monkeypatch.setattr(input_files, "_opened", set())
+    monkeypatch.setattr(input_files, "_declared", set())
+    write(tmp_path, "results/d.csv", "1")
+    assert opened(tmp_path) == {}
+    input_files.declare("results/d.csv")
+    input_files.declare("results/missing.csv")
+    assert opened(tmp_path) == {"results/d.csv": input_files.file_hash(tmp_path / "results/d.csv")}
+
+
 def test_an_experiment_records_the_scene_that_it_reads(tmp_path, monkeypatch):
     monkeypatch.setattr(input_files, "_opened", set())
 

@@ -109,7 +109,7 @@ def test_measured_gains_are_compared_where_they_are_farthest_off(monkeypatch):
            for n, off in zip(sizes, (1.1, 2.0), strict=True) for name in methods]
     table = {"particles": np.repeat(sizes, len(methods)), "method": np.array(2 * methods),
              "cpu_run": np.array(cpu)}
-    recorded = {}
+    recorded, declared = {}, []
 
     class Results:
         def __init__(self, folder):
@@ -123,12 +123,14 @@ def test_measured_gains_are_compared_where_they_are_farthest_off(monkeypatch):
             recorded[target] = value, rule
 
     monkeypatch.setattr(reduced_size, "ProfileResults", Results)
+    monkeypatch.setattr(reduced_size, "declare", declared.append)
     full = ArmRunCost(FULL, 5.0)
     reduced_size.record_gains(Run(), rivals(), dict.fromkeys(reduced_size.REDUCED, full))
     value, rule = recorded["trade.reduced-size.nsf.few.gain-measured"]
     assert value == pytest.approx(0.5)
     assert rule["bound"] == (1.0 / 1.3, 1.3)
     assert "0.909 over 1 at 8000 particles; 0.5 over 1 at 27000" in rule["note"]
+    assert declared == ["results/standard/trade.reduced.methods.csv"]
 
 
 def test_carried_models_step_as_full_runs_do():
