@@ -131,6 +131,11 @@ def test_the_added_law_has_right_derivatives(additions_page):
     assert additions_page["principal_stress"](tuple(s), law) == pytest.approx(tau)
 
 
+def test_the_added_law_passes_the_taylor_test(additions_page):
+    ratios = np.divide(additions_page["remainders"][:-1], additions_page["remainders"][1:])
+    assert ratios == pytest.approx([4.0, 4.0], rel=1e-3)
+
+
 def test_the_added_law_makes_implicit_steps(additions_page):
     stretch = np.tile(np.diag((1.1, 0.95)), (len(additions_page["points"].x), 1, 1))
     block = block_of(additions_page) | {"F": stretch}
