@@ -18,7 +18,7 @@ from mpm_ref.monitor import Unstable
 from mpm_ref.scene import build
 from mpm_ref.scene.toml import digest
 from mpm_ref.simulate import State, advance, check, ended, frame_is_due, show
-from mpm_ref.store.manifest import source_hash
+from mpm_ref.store.manifest import peak_memory, source_hash
 from mpm_ref.streams import first_bodies, total_bodies
 from mpm_ref.timestep import TooLarge
 
@@ -45,7 +45,8 @@ class RunHistory(NamedTuple):
     speed: np.ndarray       # (shots, N) [m/s]
     stress: np.ndarray      # (shots, N) Frobenius norm of the Kirchhoff stress [Pa]
     facts: dict             # scene and source (hashes), patience, end, why it ended, mass [kg]
-                            # at the start and the end, commit, rejected steps
+                            # at the start and the end, commit, rejected steps,
+                            # memory: peak of the process by the end [bytes]
 
     def column(self, name):
         """Return one entry of `COLUMNS` at every step."""
@@ -75,7 +76,8 @@ def run_history(scene, file, patience, with_states=False):
     if stored is not None and {k: stored.facts.get(k) for k in key} == key:
         return stored
     history = run(scene, patience, file if with_states else None)
-    history = history._replace(facts={**key, **history.facts, "commit": commit(ROOT)})
+    history = history._replace(facts={**key, **history.facts, "commit": commit(ROOT),
+                                      "memory": peak_memory()})
     write(file, history)
     return history
 

@@ -137,6 +137,9 @@ def record_cost(run, name, history):
     run.record(f"{id}.cpu", 1e6 * cpu / history.column("particles").sum(), unit="us",
                comparator="info", scale=scale, note=f"CPU time per particle and step; "
                f"{cpu:.0f} s in all, {history.column('solve').sum() / cpu:.0%} of it in the solves")
+    if "memory" in history.facts:
+        run.record(f"{id}.memory", 1e-9 * history.facts["memory"], unit="GB", comparator="info",
+                   scale=scale, note="peak of the process, in which other experiments may have run")
 
 
 sauce = scene_experiment("sauce", 900)

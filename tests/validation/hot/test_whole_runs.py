@@ -94,6 +94,7 @@ def test_momentum_balances_only_with_the_impulse_of_the_conditions(history, monk
 def test_history_is_read_where_it_was_run(tmp_path, monkeypatch):
     file = tmp_path / "states" / "bust.npz"
     stored = run_history(small(1), file, 1e3)
+    assert stored.facts["memory"] > 1e7
     assert (file.parent / ".gitignore").read_text() == "*\n"
     monkeypatch.setattr(histories, "run", lambda *_: pytest.fail("it is there"))
     again = run_history(small(1), file, 1e3)
@@ -120,6 +121,16 @@ def test_broken_run_is_stored_with_its_reason():
     history = run(with_(scene, limits=with_(scene.limits, J=(0.9999, 1.0001))), 1e3)
     assert "J is outside" in history.facts["why"]
     assert history.times[-1] > 0.0
+
+
+def test_peak_memory_is_recorded_of_runs_that_noted_it(history):
+    rows = {}
+    run = SimpleNamespace(record=lambda id, value, **notes: rows.update({id: value}))
+    whole_runs.record_cost(run, "faceless", history)
+    assert "hot.scenes.faceless.memory" not in rows
+    noted = history._replace(facts={**history.facts, "memory": 2_500_000_000})
+    whole_runs.record_cost(run, "faceless", noted)
+    assert rows["hot.scenes.faceless.memory"] == pytest.approx(2.5)
 
 
 @pytest.mark.parametrize("share", [None, 0.25])
