@@ -178,10 +178,15 @@ def test_every_method_is_tried_and_newton_with_multigrid_bears_its_cycle():
 
 
 class Records(dict):
-    """What an experiment records: {target: (value, note)}."""
+    """What an experiment records: {target: (value, note)}, and the bounds of what is judged."""
+
+    def __init__(self, profile="standard"):
+        self.profile, self.bounds = profile, {}
 
     def record(self, target, value, *, note, **given):
         self[target] = value, note
+        if "bound" in given:
+            self.bounds[target] = given["bound"]
 
 
 def test_ranges_name_their_scenes_and_where_a_method_changes_places_with_hot():
@@ -202,6 +207,18 @@ def test_ranges_name_their_scenes_and_where_a_method_changes_places_with_hot():
     assert note.endswith("wheel (0.5 -> 2)")
     assert "the paper, at equal tolerance: 1.98" in run[
         "trade.hot.scenes.range.pn-pcg.equal-eps.min"][1]
+
+
+@pytest.mark.parametrize(("profile", "bounds"), [
+    ("standard", {"trade.hot.scenes.range.hot-plus.equal-error.mean": 0.7}), ("quick", {})])
+def test_the_mean_of_hot_plus_at_equal_error_is_judged(profile, bounds):
+    run = Records(profile)
+    ratios = {"hot-plus": 0.5, "pn-pcg": 4.0}
+    record_ranges(run, {"wheel": {"equal-eps": ratios, "equal-error": ratios},
+                        "boxes": {"equal-eps": ratios, "equal-error": {"hot-plus": 2.0}}})
+    assert run.bounds == bounds
+    assert run["trade.hot.scenes.range.hot-plus.equal-error.mean"][0] == pytest.approx(1.0)
+    assert run["trade.hot.scenes.range.pn-pcg.equal-eps.mean"][0] == pytest.approx(4.0)
 
 
 def test_ranking_counts_trials_that_can_be_compared():
