@@ -14,7 +14,8 @@ PACKAGES = {"plain", "materials", "materials.learned", "hot", "rom", "rom.study"
             "nclaw.study", "shapes", "sampling", "scene", "oracle", "cli", "executor", "sweep",
             "trade", "limits", "needs"}
 FLOORS = (
-    ("core.kernel_cache", "core.precision", "core.blas", "core.lanes", "core.prefetch"),
+    ("core.kernel_cache", "core.precision", "core.blas", "core.lanes", "core.prefetch",
+     "core.heap"),
     ("core.jit",),
     ("core.tensor", "core.gimp", "core.block_table", "core.packing"),
     ("core.mls_slopes",),

@@ -1,6 +1,5 @@
 """Records that were edited, or whose source has changed, are found; and made again, compared."""
 
-import hashlib
 import json
 import time
 from pathlib import Path
@@ -10,15 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 from validation import __main__ as cli
-from validation.common import input_files, standing
-from validation.common.input_files import opened
+from validation.common import standing
 from validation.common.provenance import Occupation, busy_cores, occupation
 from validation.common.recheck import ChangedNumber, differences, recheck, sample
 from validation.common.record import Measurement, Origin, read_records, sealed, write_records
 from validation.common.registry import Catalogue, Experiment, discover
 from validation.common.results import RESULTS, ProfileResults
 from validation.common.run import RunSetting, run_all
-from validation.common.scenes import catalogue_scene
 from validation.common.source_digest import ROOT, STORAGE, closure, file_of, source_digest
 from validation.common.standing import (
     WORDS,
@@ -169,52 +166,6 @@ def test_the_storage_of_numbers_is_no_source():
     assert not names & STORAGE
     assert {"validation.common.scenes", "mpm_ref.hot.step"} <= names
     assert all(file_of(name, ROOT) for name in STORAGE)
-
-
-# Data files
-
-def test_data_files_that_are_opened_are_noted_with_their_hash(tmp_path):
-    for file in ("scenes/a.toml", "validation/nsf/weights/b.npz", "validation/targets/c.toml",
-                 "mpm_ref/code.py", "results/d.json"):
-        write(tmp_path, file, file)
-        (tmp_path / file).read_bytes()
-    write(tmp_path, "scenes/unread.toml", "")
-    (tmp_path / "scenes/unread.toml").unlink()
-    assert opened(tmp_path) == {file: hashlib.sha256(file.encode()).hexdigest()[:16]
-                                for file in ("scenes/a.toml", "validation/nsf/weights/b.npz")}
-
-
-def test_a_result_counts_where_it_is_declared(tmp_path, monkeypatch):
-    monkeypatch.setattr(input_files, "_opened", set())
-    monkeypatch.setattr(input_files, "_declared", set())
-    write(tmp_path, "results/d.csv", "1")
-    assert opened(tmp_path) == {}
-    input_files.declare("results/d.csv")
-    input_files.declare("results/missing.csv")
-    assert opened(tmp_path) == {"results/d.csv": input_files.file_hash(tmp_path / "results/d.csv")}
-
-
-def test_an_experiment_records_the_scene_that_it_reads(tmp_path, monkeypatch):
-    monkeypatch.setattr(input_files, "_opened", set())
-
-    def reads_a_scene(run):
-        catalogue_scene("hello")
-        run.record(f"{ID}.error", 0.5, comparator="<=", bound=1.0)
-
-    assert run_all([TOY._replace(function=reads_a_scene)], RunSetting("quick", tmp_path)) == []
-    inputs = ProfileResults(tmp_path).records(ID)[0].origin.inputs
-    assert inputs == input_files.always() | {
-        "scenes/hello.toml": input_files.file_hash(ROOT / "scenes/hello.toml")}
-
-
-def test_printed_values_count_and_their_rules_do_not(tmp_path):
-    text = 'paper = "a"\ntargets = [{id = "a.b", value = 1.0, what = "x"}]\n'
-    write(tmp_path, "validation/targets/a.toml", text)
-    before = input_files.hash_now("validation/targets", tmp_path)
-    for new, same in ((text.replace('"x"', '"y"'), True), (text + '[[cause]]\nids = []\n', True),
-                      (text.replace("1.0", "2.0"), False)):
-        write(tmp_path, "validation/targets/a.toml", new)
-        assert (input_files.hash_now("validation/targets", tmp_path) == before) is same
 
 
 # Markers
