@@ -6,7 +6,7 @@ would then be faster than it is: the time that it lacks is counted instead.
 
 from collections import deque
 
-SPAN = 1.0          # the real-time factor is that of the last seconds of this number [s]
+SPAN = 1.0          # at the end of which the real-time factor is taken [s]
 ROUNDING = 1e-9     # of a step: one that is due this little later is due
 
 
@@ -45,6 +45,6 @@ class Pace:
 
     @property
     def factor(self):
-        """The simulated time over that of the clock, in the last `SPAN`; None before any."""
+        """The simulated time over that of the clock, in the last `SPAN`; None before it is over."""
         (then, before), (now, played) = self._marks[0], self._marks[-1]
-        return (played - before) / (now - then) if now > then else None
+        return (played - before) / (now - then) if now - then >= SPAN else None

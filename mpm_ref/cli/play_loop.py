@@ -18,7 +18,7 @@ from .play_screen import KEYS, Screen, status_line, warning_line
 
 FRAME = 0.05                # [s] from one picture to the next, at least
 SIZE = 80, 20               # characters of a picture without a terminal
-BORDER, LINES = 2, 2        # characters of the panel in each direction, and lines below it
+BORDER, LINES = 2, 4        # characters of the panel in each direction, and lines below it
 SECOND = round(1.0 / FRAME)     # frames of a second
 
 
@@ -38,9 +38,11 @@ class PlayedTime(NamedTuple):
 
 
 def advance(session, pace, clock, deadline=inf):
-    """Make the steps of a session that are due, until a time of the clock [s] at most."""
-    while session.is_running and pace.is_due(session.played) and clock() < deadline:
+    """Make the steps of a session that are due: one, and others until a time of the clock [s]."""
+    while session.is_running and pace.is_due(session.played):
         session.step()
+        if clock() >= deadline:
+            break
     note = pace.mark if session.is_running else pace.reset
     note(clock(), session.played)
 
@@ -76,7 +78,7 @@ def panel(screen, title, size, lines):
     status, warning = lines
     return Group(Panel(Text("\n".join(picture), no_wrap=True), title=Text(title),
                        subtitle=Text(KEYS), padding=0),
-                 Text(status, no_wrap=True), Text(warning, style="bold red", no_wrap=True))
+                 Text(status, no_wrap=True), Text(warning, style="bold red"))
 
 
 # Without a terminal.

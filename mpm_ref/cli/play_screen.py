@@ -4,9 +4,10 @@ import numpy as np
 
 from .braille import characters, dots, region_around
 
-KEYS = "arrows: tilt gravity, more, less | space: pause | r: restart | q: quit"
+KEYS = "arrows: tilt gravity, stronger, weaker | space: pause | r: restart | q: quit"
 AGAIN = "press r to restart"
-UPRIGHT = 0.5       # degrees; a smaller tilt is not named
+UPRIGHT = 0.5       # degrees; a smaller tilt is not named,
+PUNCTUAL = 0.1      # nor is less time behind [s]
 
 
 class Screen:
@@ -32,9 +33,10 @@ def status_line(session, pace):
     parts = [f"t = {session.state.t:.2f} s", gravity_text(session.load)]
     if session.is_paused:
         parts.append("paused")
-    elif session.is_running and pace.factor is not None:
-        parts.append(f"{pace.factor:.2f} x real time")
-        if pace.behind:
+    elif session.is_running:
+        if pace.factor is not None:
+            parts.append(f"{pace.factor:.2f} x real time")
+        if pace.behind >= PUNCTUAL:
             parts.append(f"{pace.behind:.1f} s behind")
     return " | ".join(parts)
 
