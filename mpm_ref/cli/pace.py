@@ -10,7 +10,7 @@ SPAN = 1.0          # at the end of which the real-time factor is taken [s]
 ROUNDING = 1e-9     # of a step: one that is due this little later is due
 
 
-class Pace:
+class RealTimePace:
     """The simulated time that is due, what it lacks, and the real-time factor.
 
     Times that were played are those of all steps, over restarts; times of the clock begin anywhere.

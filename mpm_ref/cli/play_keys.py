@@ -9,6 +9,12 @@ from typing import NamedTuple
 
 from ..rom.study.play import PlayCommand
 
+try:
+    import termios
+    import tty
+except ImportError:         # not a POSIX system
+    termios = tty = None
+
 COMMANDS = {
     "left": PlayCommand.TILT_LEFT, "right": PlayCommand.TILT_RIGHT,
     "up": PlayCommand.STRENGTHEN, "down": PlayCommand.WEAKEN,
@@ -92,11 +98,8 @@ class Keyboard:
 def require_terminal():
     """Raise ValueError unless keys can be read and pictures drawn on the terminal."""
     advice = "; play there, or add --seconds S to play without a terminal"
-    try:
-        import termios  # noqa: F401
-    except ImportError:
-        raise ValueError(f"keys are read on POSIX systems alone, not on {sys.platform}{advice}"
-                         ) from None
+    if termios is None:
+        raise ValueError(f"keys are read on POSIX systems alone, not on {sys.platform}{advice}")
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise ValueError(f"keys and pictures need a terminal, and there is none here{advice}")
     if "utf" not in (sys.stdout.encoding or "").lower():
@@ -107,8 +110,6 @@ def require_terminal():
 @contextmanager
 def keyboard():
     """Give the `Keyboard` of the terminal, whose settings are restored afterwards."""
-    import termios
-    import tty
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
     try:

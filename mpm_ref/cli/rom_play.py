@@ -4,23 +4,16 @@ from math import isfinite
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from .. import plotting
 from ..rom.study import reduce
 from ..rom.study.play import middle_parameters, play_session
 from ..store.text import counted
 from .errors import UNSTABLE, end, options
-from .options import (
-    Json,
-    MapFile,
-    StudyName,
-    load_map,
-    open_study,
-    parse_assignments,
-)
+from .options import Json, MapFile, StudyName, load_map, open_study, parse_assignments
 from .play_keys import keyboard, parse_script, require_terminal
-from .play_loop import play_on_terminal, play_script
+from .play_loop import play_script
+from .play_terminal import play_on_terminal
 from .terminal import as_json, compiling, warn
 from .view import View, view_axes
 
@@ -60,7 +53,7 @@ def play(
             session.warm_up()
         if seconds is None:
             with keyboard() as pressed:
-                play_on_terminal(session, pressed, Console(), title_of(study, session))
+                play_on_terminal(session, pressed, title_of(study, session))
             return
         time = play_script(session, script, seconds)
         what = description(study, model, session)
@@ -122,7 +115,7 @@ def description(study, model, session):
 def facts(what, session, time):
     """Return a session of this description that was played without a terminal, as plain values."""
     return what | {
-        "steps": session.steps, "played": time.played, "wall": time.wall,
+        "steps": session.steps, "played": time.played, "wall": time.wall, "cpu": time.cpu,
         "real_time_factor": time.factor, "slowest_second": time.slowest,
         "pictures": time.pictures, "pictures_beyond_training": time.beyond,
         "t": session.state.t, "gravity": session.load.gravity.tolist(),
@@ -132,8 +125,9 @@ def facts(what, session, time):
 def summary(what, session, time):
     """Return the line about a session of this description without a terminal."""
     return (f"{what['study']}, {what['kind']} r = {what['r']}, {counted(what['points'], 'point')}: "
-            f"{counted(session.steps, 'step')}, {time.played:.4g} s played in {time.wall:.3g} s, "
-            f"{time.factor:.3g} x real time, in the slowest second {time.slowest:.3g} x")
+            f"{counted(session.steps, 'step')}, {time.played:.4g} s played in {time.wall:.3g} s "
+            f"({time.cpu:.3g} s of CPU time), {time.factor:.3g} x real time, in the slowest second "
+            f"{time.slowest:.3g} x")
 
 
 def range_warnings(time):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mpm_ref.cli.braille import Region, characters, dots, region_around
-from mpm_ref.cli.pace import SPAN, Pace
+from mpm_ref.cli.pace import SPAN, RealTimePace
 from mpm_ref.cli.play_keys import Keyboard, parse_keys, parse_script
 from mpm_ref.cli.play_screen import gravity_text, status_line, warning_line
 from mpm_ref.rom.study.play import PlayCommand, initial_load
@@ -99,10 +99,10 @@ def test_a_region_grows_with_the_points_that_are_finite():
     assert (larger.low.tolist(), larger.high.tolist()) == ([-2.0, -3.5], [7.0, 4.5])
 
 
-# Pace.
+# RealTimePace.
 
 def test_steps_are_due_when_the_clock_has_passed_them():
-    pace = Pace(0.1, 0.0, 0.0)
+    pace = RealTimePace(0.1, 0.0, 0.0)
     assert not pace.is_due(0.0)
     pace.allow(0.25)
     assert [pace.is_due(played) for played in (0.0, 0.1, 0.2)] == [True, True, False]
@@ -111,7 +111,7 @@ def test_steps_are_due_when_the_clock_has_passed_them():
 
 
 def test_time_that_is_lacking_is_counted_and_not_made_up_for():
-    pace = Pace(0.1, 0.0, 0.0)
+    pace = RealTimePace(0.1, 0.0, 0.0)
     pace.allow(1.0)
     pace.mark(1.0, 0.4)
     assert pace.behind == pytest.approx(0.6)
@@ -124,7 +124,7 @@ def test_time_that_is_lacking_is_counted_and_not_made_up_for():
 
 
 def test_the_factor_is_that_of_the_last_second():
-    pace = Pace(0.01, 0.0, 0.0)
+    pace = RealTimePace(0.01, 0.0, 0.0)
     factors = []
     for k in range(1, 41):                  # a second at full speed, another at half
         played = 0.1 * min(k, 20) + 0.05 * max(k - 20, 0)
@@ -139,7 +139,7 @@ def test_the_factor_is_that_of_the_last_second():
 
 
 def test_a_step_that_takes_longer_than_a_second_has_a_factor():
-    pace = Pace(0.1, 0.0, 0.0)
+    pace = RealTimePace(0.1, 0.0, 0.0)
     pace.mark(3.0 * SPAN, 0.1)
     assert pace.factor == pytest.approx(0.1 / 3.0)
 

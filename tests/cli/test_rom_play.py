@@ -3,7 +3,6 @@
 import json
 import os
 import pty
-import sys
 import termios
 from types import SimpleNamespace
 
@@ -13,8 +12,9 @@ from command_line import assert_told, mpm_ref
 from rich.console import Console
 from small_studies import modelled
 
-from mpm_ref.cli import play_keys, play_loop
-from mpm_ref.cli.play_loop import PlayedTime, play_on_terminal, played_time
+from mpm_ref.cli import play_keys, play_terminal
+from mpm_ref.cli.play_loop import FRAME, PlayedTime, played_time
+from mpm_ref.cli.play_terminal import play_on_terminal
 from mpm_ref.cli.rom_play import range_warnings, side_view
 from mpm_ref.rom.study import reduce
 from mpm_ref.rom.study.play import PlayCommand, play_session
@@ -114,7 +114,7 @@ def test_a_map_is_needed(made):
 
 
 def test_a_system_without_posix_terminals_is_refused(made, monkeypatch):
-    monkeypatch.setitem(sys.modules, "termios", None)
+    monkeypatch.setattr(play_keys, "termios", None)
     assert_told(play(made), 2, "keys are read on POSIX systems alone, not on ")
 
 
@@ -132,14 +132,16 @@ def test_the_side_is_that_on_which_gravity_points_downwards():
 
 def test_the_slowest_second_is_that_of_twenty_frames():
     wall = np.concatenate([np.full(30, 0.01), np.full(20, 0.1), np.full(30, 0.01)])
-    marks = [(0.0, 0.0), *zip(wall.cumsum(), 0.05 * np.arange(1, 81), strict=True)]
+    times = wall.cumsum(), 0.5 * wall.cumsum(), 0.05 * np.arange(1, 81)
+    marks = [(0.0, 0.0, 0.0), *zip(*times, strict=True)]
     found = played_time(marks, ["", "far", "far"])
     assert found.played == pytest.approx(4.0)
     assert found.factor == pytest.approx(4.0 / 2.6)
+    assert found.cpu == pytest.approx(1.3)
     assert found.slowest == pytest.approx(0.5)
     assert (found.pictures, found.beyond) == (3, 2)
-    assert played_time([(0.0, 0.0)], []) == (0.0, 0.0, 0.0, 0, 0)
-    assert list(range_warnings(PlayedTime(1.0, 1.0, 1.0, 20, 0))) == []
+    assert played_time([(0.0, 0.0, 0.0)], []) == (0.0, 0.0, 0.0, 0.0, 0, 0)
+    assert list(range_warnings(PlayedTime(1.0, 1.0, 1.0, 1.0, 20, 0))) == []
 
 
 # On a terminal.
@@ -170,16 +172,16 @@ class ScriptedKeys:
 
 def play_with(session, monkeypatch, look, *presses):
     clock = Clock(look)
-    monkeypatch.setattr(play_loop, "perf_counter", clock)
+    monkeypatch.setattr(play_terminal, "perf_counter", clock)
     with open(os.devnull, "w", encoding="utf-8") as nowhere:
         console = Console(file=nowhere, force_terminal=True, width=60, height=20)
-        play_on_terminal(session, ScriptedKeys(clock, *presses), console, "Bars")
+        play_on_terminal(session, ScriptedKeys(clock, *presses), "Bars", console)
     return clock
 
 
 def test_a_run_on_a_terminal_waits_for_the_clock(session, monkeypatch):
     clock = play_with(session, monkeypatch, 1e-5, (1.0, PlayCommand.QUIT))
-    assert session.played == pytest.approx(clock.time, abs=2.0 * play_loop.FRAME + DT)
+    assert session.played == pytest.approx(clock.time, abs=2.0 * FRAME + DT)
 
 
 def test_a_run_that_is_slower_than_the_clock_still_goes_on(session, monkeypatch):
@@ -192,7 +194,7 @@ def test_a_run_that_is_slower_than_the_clock_still_goes_on(session, monkeypatch)
 def test_time_does_not_pass_in_a_pause(session, monkeypatch):
     clock = play_with(session, monkeypatch, 1e-5, (0.5, PlayCommand.PAUSE),
                       (1.5, PlayCommand.PAUSE), (2.0, PlayCommand.QUIT))
-    assert session.played == pytest.approx(clock.time - 1.0, abs=4.0 * play_loop.FRAME)
+    assert session.played == pytest.approx(clock.time - 1.0, abs=4.0 * FRAME)
 
 
 def test_a_keyboard_gives_the_terminal_back_as_it_was(monkeypatch):
