@@ -1,7 +1,7 @@
-"""Implement `mpm-ref rom studies | generate | train | run | evaluate`: reduced models of a scene.
+"""Implement `mpm-ref rom studies | generate | train | run | play | evaluate`: reduced models.
 
 A study file names the scene, its parameters and the map (docs/reference/studies.md). `rom_train`
-has the commands `generate` and `train`, `rom_info` has `studies`.
+has the commands `generate` and `train`, `rom_info` has `studies`, `rom_play` has `play`.
 """
 
 import sys
@@ -30,7 +30,7 @@ from ..scene import SceneError
 from ..store.atomic import require_place, require_space, size_text
 from ..store.running import FINISHED
 from ..store.text import counted
-from . import rom_info, rom_train
+from . import rom_info, rom_play, rom_train
 from .catalogue import require_other_file
 from .errors import UNSTABLE, end, options, writing
 from .options import (
@@ -64,6 +64,9 @@ app.command("generate", epilog=examples(
     "generate gravity_small", "generate torsion --workers 1 --out runs"))(rom_train.make_data)
 app.command(epilog=examples("train gravity_small",
                             "train gravity --kind modes --out modes.npz"))(rom_train.train)
+app.command(epilog=examples("play gravity_small", "play gravity --set g=5 --view xz",
+                            "play gravity_small --seconds 5 --keys '1 right, 2 up, 4 r'"))(
+    rom_play.play)
 Set = Annotated[list[str] | None, typer.Option(
     "--set", help="NAME=VALUE for a parameter of the study; repeat it for each one.")]
 

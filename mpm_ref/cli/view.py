@@ -30,7 +30,7 @@ def plot(
 
     In 3D, solids are cut at half the depth of the particles.
     """
-    what = {"frame": frame, "field": field, "view": _axes(view)}
+    what = {"frame": frame, "field": field, "view": view_axes(view)}
     _to_file(plotting.save_plot, file, out, PICTURES, **what)
 
 
@@ -42,7 +42,7 @@ def animate(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.gif")] = None,
 ):
     """Create a GIF animation of all frames."""
-    _to_file(plotting.animate, file, out, (".gif",), field=field, view=_axes(view), fps=fps)
+    _to_file(plotting.animate, file, out, (".gif",), field=field, view=view_axes(view), fps=fps)
 
 
 def export(
@@ -74,8 +74,8 @@ def _to_file(make, file, out, suffixes, **what):
         print(out)
 
 
-def _axes(view):
-    """Axes by name, xz, as numbers."""
+def view_axes(view):
+    """Return the axes (right, up) of a view such as xz as numbers; None of None."""
     if view is None:
         return None
     with options():

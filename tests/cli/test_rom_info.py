@@ -141,7 +141,7 @@ def test_the_bundled_studies_are_listed_with_their_titles():
 
 def test_each_command_has_a_sentence_and_an_example():
     commands = get_command(rom.app).commands
-    assert list(commands) == ["studies", "generate", "train", "run", "evaluate"]
+    assert list(commands) == ["studies", "generate", "train", "play", "run", "evaluate"]
     for name, command in commands.items():
         sentence = command.help.split("\n\n")[0]
         assert sentence.endswith(".")

@@ -19,6 +19,7 @@ MANY_PARAMETERS: dict[str, str] = {
     "mpm_ref/cli/limits.py::measure": "typer: one parameter per option",
     "mpm_ref/cli/oracle.py::record": "typer: one parameter per option",
     "mpm_ref/cli/rom.py::run": "typer: one parameter per option",
+    "mpm_ref/cli/rom_play.py::play": "typer: one parameter per option",
     "mpm_ref/cli/law_train.py::train": "typer: one parameter per option",
     "mpm_ref/cli/trade.py::measure": "typer: one parameter per option",
     "mpm_ref/cli/needs.py::find": "typer: one parameter per option",
