@@ -75,7 +75,7 @@ class FullRun(NamedTuple):
     F: np.ndarray       # (k + 1, n, d, d)
 
 
-class Training(NamedTuple):
+class BlockTraining(NamedTuple):
     """The training runs of a start and a transfer, and modes of them."""
 
     start: str          # of STARTS
@@ -99,11 +99,11 @@ def full_run(scene):
 
 
 def training(start, transfer):
-    """Return the `Training` of a start and a transfer."""
+    """Return the `BlockTraining` of a start and a transfer."""
     runs = [full_run(two_blocks(start, transfer, speed)) for speed in TRAIN]
     x, F = (np.concatenate(field) for field in zip(*runs, strict=True))
     X = ldm_full_model(two_blocks(start, transfer, TRAIN[0])).X
-    return Training(start, transfer, runs, {r: modes(X, x, F, r) for r in SIZES})
+    return BlockTraining(start, transfer, runs, {r: modes(X, x, F, r) for r in SIZES})
 
 
 def rivals_of(trained, speed):
@@ -148,16 +148,16 @@ def several_bodies(run):
     run.table("runs", COLUMNS, rows)
 
 
-def record(run, trained, tests, found):
-    """Record the errors of rivals, a `Comparison`, the nearest states of the modes, and which
+def record(run, trained, tests, comparison):
+    """Record the errors of the rivals of a `Comparison`, the nearest states of the modes, and which
     reduced run is below what.
     """
     id = f"ldm.several-bodies.{trained.start}.{trained.transfer}"
     full = next(iter(tests.values())).test
     scale = (f"{len(full.X)} particles of two bodies, {STEPS} steps, {len(TRAIN)} training runs, "
              f"{len(tests)} held out")
-    errors = {one.name: one.errors for one in found.rivals}
-    cpu = {one.name: one.cpu for one in found.rivals}
+    errors = {one.name: one.errors for one in comparison.rivals}
+    cpu = {one.name: one.cpu for one in comparison.rivals}
     for name in LOOKED_UP:
         record_error(run, f"{id}.{name}", errors[name], scale, "looked up")
     for r, g in trained.maps.items():
@@ -176,8 +176,8 @@ def record(run, trained, tests, found):
                    "run, all points as samples, one thread")
 
 
-def record_error(run, id, errors, scale, note):
+def record_error(run, target, errors, scale, note):
     """Record the displacement error of `PositionErrors`, in per cent."""
-    run.record(id, 100.0 * errors.displacement, unit="%", comparator="info", scale=scale,
+    run.record(target, 100.0 * errors.displacement, unit="%", comparator="info", scale=scale,
                note=f"of the displacement; {note}; of the distance from the centroid "
                f"{100.0 * errors.centroid:.3g} %")

@@ -33,7 +33,7 @@ MISSING = ("not run: PyTorch is not installed; `make learn` installs it in the r
 
 
 class EpochCost(NamedTuple):
-    """What an epoch takes, and what it computes."""
+    """The cost of an epoch, its loss and its gradients."""
 
     cpu: float          # [s]
     process: float      # largest resident memory of the process [GB]

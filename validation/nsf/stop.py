@@ -1,5 +1,5 @@
-"""Where Gauss-Newton ends (NSF-sec5.3): with a tolerance on the change of the latent coordinates
-beside none, with which only round-off is left to gain.
+"""The end of Gauss-Newton (NSF-eq10, section 5.3): with a tolerance on the change of the latent
+coordinates beside none, with which only round-off is left to gain.
 
 Chosen before the first run: with 1e-6 the errors of positions and stress change by at most 1e-3 of
 themselves, and a run's median step takes at most the 3 iterations that the paper prints.
@@ -124,20 +124,20 @@ def largest_change(runs, before):
                for case, own in runs.items() for name in ("origin", "stress"))
 
 
-def record_change(run, id, change, scale):
+def record_change(run, target, change, scale):
     """Record the largest change of errors; of the tolerance JUDGED with a bound."""
-    rule = ({"comparator": "<=", "bound": MOST_CHANGE} if id.endswith(f".{JUDGED}")
+    rule = ({"comparator": "<=", "bound": MOST_CHANGE} if target.endswith(f".{JUDGED}")
             else {"comparator": "info"})
-    run.record(f"{id}.change", change, scale=scale, scatter=1.0, **rule,
+    run.record(f"{target}.change", change, scale=scale, scatter=1.0, **rule,
                note="largest change of the error of positions or stress in a run, over that "
                     "without a tolerance")
 
 
-def record_iterations(run, id, runs, scale):
+def record_iterations(run, target, runs, scale):
     """Record the largest median of iterations of `StoppedRun`s; of JUDGED with a bound."""
-    rule = ({"comparator": "<=", "bound": MOST_ITERATIONS} if id.endswith(f".{JUDGED}")
+    rule = ({"comparator": "<=", "bound": MOST_ITERATIONS} if target.endswith(f".{JUDGED}")
             else {"comparator": "info"})
-    run.record(f"{id}.iterations", max(one.median for one in runs), scale=scale, **rule,
+    run.record(f"{target}.iterations", max(one.median for one in runs), scale=scale, **rule,
                note="largest median over a run's steps; in the mean "
                     f"{np.mean([one.mean for one in runs]):.3g}, the most in any step "
                     f"{max(one.most for one in runs):g}; error of positions in the mean "
