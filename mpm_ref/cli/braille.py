@@ -41,6 +41,7 @@ def dots(x, region, columns, rows):
     with np.errstate(invalid="ignore"):
         place = np.floor((x - middle) / scale + 0.5 * shape)
         place = np.where(x == region.high, np.minimum(place, shape - 1), place)
+        place = np.where(x == region.low, np.maximum(place, 0), place)
         inside = ((place >= 0) & (place < shape)).all(axis=1)
     column, row = place[inside].astype(int).T
     result = np.zeros(shape[::-1], dtype=bool)

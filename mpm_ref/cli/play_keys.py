@@ -23,6 +23,7 @@ COMMANDS = {
 ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left"}
 PLAIN = {b" ": "space", b"r": "r", b"R": "r", b"q": "q", b"Q": "q"}
 ESCAPE, OPENERS = b"\x1b", b"[O"        # how an arrow begins: both together
+PARAMETERS = range(0x20, 0x40)          # bytes between these and the last one, as of Shift-F2
 READ = 1024         # bytes at a time
 
 
@@ -47,14 +48,22 @@ def parse_keys(data):
         if data[k:k + 1] != ESCAPE:
             names.append(PLAIN.get(data[k:k + 1]))
             k += 1
-        elif len(data) < k + 3 and all(byte in OPENERS for byte in data[k + 1:]):
-            break
-        elif data[k + 1] in OPENERS:
-            names.append(ARROWS.get(data[k + 2:k + 3]))
-            k += 3
-        else:
+        elif k + 1 < len(data) and data[k + 1] not in OPENERS:
             k += 1
+        else:
+            last = end_of_sequence(data, k)
+            if last is None:
+                break
+            names.append(ARROWS.get(data[k + 2:last + 1]))
+            k = last + 1
     return Keys([name for name in names if name], data[k:])
+
+
+def end_of_sequence(data, k):
+    """Return the place of the last byte of the sequence that an escape at k and an opener begin;
+    None where it is still to come.
+    """
+    return next((i for i in range(k + 2, len(data)) if data[i] not in PARAMETERS), None)
 
 
 def parse_script(text):

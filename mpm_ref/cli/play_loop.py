@@ -28,6 +28,7 @@ class PlayedTime(NamedTuple):
     slowest: float          # real-time factor of the slowest second that was simulated
     pictures: int
     beyond: int             # pictures with latent coordinates out of the range of training
+    breakdown: str          # the sentence about the first breakdown, or ""
 
     @property
     def factor(self):
@@ -52,6 +53,7 @@ def play_script(session, script, seconds):
     """
     screen, clock, script = Screen(session), perf_counter, list(script)
     pace, marks, beyond = RealTimePace(session.dt, clock(), session.played), [(0.0, 0.0, 0.0)], []
+    breakdown = ""
     for k in range(ceil(seconds / FRAME - ROUNDING)):
         while script and script[0].t <= (k + ROUNDING) * FRAME:
             session.obey(script.pop(0).command)
@@ -61,20 +63,22 @@ def play_script(session, script, seconds):
         pace.allow(FRAME)
         advance(session, pace, clock)
         beyond.append(session.check())
+        breakdown = breakdown or session.breakdown
         screen.picture(*SIZE)
         if is_running:
             end = clock(), process_time(), session.played
             marks.append(tuple(map(add, marks[-1], map(sub, end, begin))))
-    return played_time(marks, beyond)
+    return played_time(marks, beyond, breakdown)
 
 
-def played_time(marks, beyond):
+def played_time(marks, beyond, breakdown):
     """Return the `PlayedTime` of the times (wall, CPU, played) [s] at the ends of the frames in
-    which the run went on, after those of the start, and the sentences of all frames.
+    which the run went on, after those of the start, the sentences of all frames, and that about a
+    breakdown.
     """
     wall, cpu, played = np.transpose(marks)
     frames = max(min(SECOND, len(marks) - 1), 1)
     spent, done = (a[frames:] - a[:-frames] for a in (wall, played))
     slowest = float((done / spent).min()) if len(spent) else 0.0
     return PlayedTime(float(played[-1]), float(wall[-1]), float(cpu[-1]), slowest, len(beyond),
-                      sum(map(bool, beyond)))
+                      sum(map(bool, beyond)), breakdown)

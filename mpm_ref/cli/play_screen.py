@@ -11,7 +11,9 @@ PUNCTUAL = 0.1      # nor is less time behind [s]
 
 
 class Screen:
-    """Draws a session from one side; the region in view grows with the body."""
+    """Draws a session from one side; the region in view grows with the body, but not with what is
+    left of one that broke down.
+    """
 
     def __init__(self, session):
         self.session = session
@@ -20,7 +22,8 @@ class Screen:
     def picture(self, columns, rows):
         """Return the lines of braille of the present state."""
         x = self._places()
-        self.region = self.region.including(x)
+        if not self.session.breakdown:
+            self.region = self.region.including(x)
         return characters(dots(x, self.region, columns, rows))
 
     def _places(self):

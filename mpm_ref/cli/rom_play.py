@@ -58,8 +58,8 @@ def play(
         time = play_script(session, script, seconds)
         what = description(study, model, session)
         print(as_json(facts(what, session, time)) if json else summary(what, session, time))
-        if session.breakdown:
-            end(session.breakdown, UNSTABLE)
+        if time.breakdown:
+            end(time.breakdown, UNSTABLE)
         warn(range_warnings(time))
 
 
@@ -119,7 +119,7 @@ def facts(what, session, time):
         "real_time_factor": time.factor, "slowest_second": time.slowest,
         "pictures": time.pictures, "pictures_beyond_training": time.beyond,
         "t": session.state.t, "gravity": session.load.gravity.tolist(),
-        "breakdown": session.breakdown or None}
+        "breakdown": time.breakdown or None}
 
 
 def summary(what, session, time):

@@ -10,7 +10,7 @@ import pytest
 from mpm_ref.cli.braille import Region, characters, dots, region_around
 from mpm_ref.cli.pace import SPAN, RealTimePace
 from mpm_ref.cli.play_keys import Keyboard, parse_keys, parse_script
-from mpm_ref.cli.play_screen import gravity_text, status_line, warning_line
+from mpm_ref.cli.play_screen import Screen, gravity_text, status_line, warning_line
 from mpm_ref.rom.study.play import PlayCommand, initial_load
 
 # Keys.
@@ -22,6 +22,8 @@ from mpm_ref.rom.study.play import PlayCommand, initial_load
     (b"\x1bOA", ["up"], b""),               # of a terminal in application mode
     (b"xy\x00\xc3\xa9r", ["r"], b""),
     (b"\x1b[Zr", ["r"], b""),               # of another key
+    (b"\x1b[1;2Q\x1b[1;2Rq", ["q"], b""),   # of Shift-F2 and Shift-F3
+    (b"r\x1b[1;", ["r"], b"\x1b[1;"),
     (b"\x1br", ["r"], b""),                 # escape by itself
     (b"r\x1b", ["r"], b"\x1b"),
     (b"r\x1b[", ["r"], b"\x1b["),
@@ -92,6 +94,10 @@ def test_points_outside_and_not_finite_have_no_dots():
 
 def test_the_ends_of_a_region_are_in_its_picture():
     assert dots(np.array([[0.0, 0.0], [1.0, 1.0]]), UNIT, 2, 1).sum() == 2
+    rng = np.random.default_rng(0)
+    for low, side in zip(rng.normal(size=(300, 2)), rng.random((300, 2)), strict=True):
+        region = Region(low, low + side)
+        assert dots(np.array(region), region, 40, 20).sum() == 2    # rounded as it may be
 
 
 def test_a_region_grows_with_the_points_that_are_finite():
@@ -152,6 +158,23 @@ def session(**changes):
     return SimpleNamespace(**{
         "state": SimpleNamespace(t=1.25), "load": initial_load((0.0, -9.81), (0, 1)),
         "is_paused": False, "is_running": True, "breakdown": ""} | changes)
+
+
+def test_what_is_left_after_a_breakdown_does_not_change_the_view():
+    square = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    far = SimpleNamespace(positions=lambda xhat: xhat * square)
+    one = session(shown=far)
+    one.state.latent = SimpleNamespace(xhat=1.0)
+    screen = Screen(one)
+    before = screen.picture(20, 10)
+    one.state.latent.xhat, one.breakdown = 500.0, "it broke"
+    screen.picture(20, 10)
+    one.state.latent.xhat, one.breakdown = 1.0, ""
+    assert screen.picture(20, 10) == before
+    one.state.latent.xhat = 500.0
+    screen.picture(20, 10)
+    one.state.latent.xhat = 1.0
+    assert screen.picture(20, 10) != before
 
 
 def test_the_line_has_time_gravity_and_pace():

@@ -94,6 +94,12 @@ def test_a_session_that_broke_down_has_status_3(made):
     assert found["steps"] < 30
 
 
+def test_a_breakdown_is_remembered_after_a_restart(made):
+    done, found = facts_of(made, "--seconds", 0.3, "--set", "g=1e4", "--keys", "0.25 r")
+    assert done.exit_code == 3
+    assert found["breakdown"] in done.stderr
+
+
 @pytest.mark.parametrize(("options", "words"), [
     ((), "keys and pictures need a terminal, and there is none here; play there, or add --seconds"),
     (("--keys", "1 up"), "--keys without --seconds: expected a session without a terminal"),
@@ -134,14 +140,14 @@ def test_the_slowest_second_is_that_of_twenty_frames():
     wall = np.concatenate([np.full(30, 0.01), np.full(20, 0.1), np.full(30, 0.01)])
     times = wall.cumsum(), 0.5 * wall.cumsum(), 0.05 * np.arange(1, 81)
     marks = [(0.0, 0.0, 0.0), *zip(*times, strict=True)]
-    found = played_time(marks, ["", "far", "far"])
+    found = played_time(marks, ["", "far", "far"], "it broke")
     assert found.played == pytest.approx(4.0)
     assert found.factor == pytest.approx(4.0 / 2.6)
     assert found.cpu == pytest.approx(1.3)
     assert found.slowest == pytest.approx(0.5)
     assert (found.pictures, found.beyond) == (3, 2)
-    assert played_time([(0.0, 0.0, 0.0)], []) == (0.0, 0.0, 0.0, 0.0, 0, 0)
-    assert list(range_warnings(PlayedTime(1.0, 1.0, 1.0, 1.0, 20, 0))) == []
+    assert played_time([(0.0, 0.0, 0.0)], [], "") == (0.0, 0.0, 0.0, 0.0, 0, 0, "")
+    assert list(range_warnings(PlayedTime(1.0, 1.0, 1.0, 1.0, 20, 0, ""))) == []
 
 
 # On a terminal.

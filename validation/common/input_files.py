@@ -41,6 +41,11 @@ def declare(path):
     _declared.add(path)
 
 
+def forget_declared():
+    """Forget what was declared, as a new experiment declares its own."""
+    _declared.clear()
+
+
 def opened(root=ROOT):
     """Return {path relative to `root`: hash} of the data files that were opened, or declared, and
     are there.

@@ -11,6 +11,7 @@ import traceback
 from pathlib import Path
 from typing import NamedTuple
 
+from . import input_files
 from .judge import Criterion, finite_ends, judge
 from .progress import SuiteProgress
 from .provenance import load_average, occupation, origin_of, provenance
@@ -73,6 +74,7 @@ class Run:
         self._cache = Cache(setting.folder / ".parts" / experiment.id, setting.commit, setting.seed)
         self._wall, self._cpu = time.perf_counter(), time.process_time()
         self._load, self._occupied = load_average(), occupation()
+        input_files.forget_declared()
 
     @property
     def folder(self):

@@ -107,7 +107,7 @@ def record_end(run, name, history):
     id, scale = f"hot.scenes.{name}", scale_text(history)
     run.record(f"{id}.done", history.column("t")[-1] / history.facts["end"], unit="1",
                comparator="=", paper=1.0, scale=scale,
-               note=f"share of the scene's time; it ended by: {history.facts['why']}; "
+               note=f"share of the time that was asked for; it ended by: {history.facts['why']}; "
                f"{counted(history.facts['rejected'], 'rejected step')}; run at "
                f"{history.facts['commit']}")
     eps = METHODS[METHOD].eps

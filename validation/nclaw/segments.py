@@ -2,8 +2,8 @@
 every 25th (`Recipe.keep_every`) and computes those between anew.
 
 One epoch of water from its trained laws, with the entire run as its only segment, in a process of
-its own for each measurement. Both bounds were chosen before the first run: 1 GB, and 1.35 times the
-time of keeping all states, at 1000 points and 1000 steps.
+its own for each measurement. The bounds are aims that were set when 0.87 GB were known of a
+training: 1 GB, and 1.35 times the time of keeping all states, at 1000 points and 1000 steps.
 """
 
 import json

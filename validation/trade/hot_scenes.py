@@ -283,7 +283,7 @@ def record_mean(run, compared, ratios, count):
     run.record(f"trade.hot.scenes.range.{method}.{what}.mean",
                geometric_mean(ratios), scale=f"{len(ratios)} of {count} scenes",
                note=f"geometric mean; {COMPARISONS[what]}"
-               + ("; our aim was 0.7 (decision 127 says why not)" if judged else ""),
+               + (f"; our aim: {AHEAD:g}, see decision 127" if judged else ""),
                **({"comparator": "<=", "bound": AHEAD} if judged else {"comparator": "info"}))
 
 

@@ -65,3 +65,23 @@ def test_printed_values_count_and_their_rules_do_not(tmp_path):
                       (text.replace("1.0", "2.0"), False)):
         write(tmp_path, "validation/targets/a.toml", new)
         assert (input_files.hash_now("validation/targets", tmp_path) == before) is same
+
+
+def test_what_an_experiment_declares_does_not_count_for_the_next(tmp_path, monkeypatch):
+    monkeypatch.setattr(input_files, "_opened", set())
+    result = "results/stale.toml"
+
+    def declares(run):
+        input_files.declare(result)
+        run.record(f"{ID}.error", 0.5, comparator="<=", bound=1.0)
+
+    def declares_not(run):
+        run.record("verification.other.error", 0.5, comparator="<=", bound=1.0)
+
+    declares.__module__ = declares_not.__module__ = table3.__module__
+    first, second = (Experiment(id, "A toy", ("quick",), {"quick": 1.0}, function)
+                     for id, function in ((ID, declares), ("verification.other", declares_not)))
+    assert run_all([first, second], RunSetting("quick", tmp_path)) == []
+    inputs = [ProfileResults(tmp_path).records(id)[0].origin.inputs
+              for id in (ID, "verification.other")]
+    assert [result in each for each in inputs] == [True, False]

@@ -16,6 +16,7 @@ from validation.nclaw.idempotence import (
     idempotent_nets,
     material_laws,
     passed_on,
+    record_diverged,
     record_errors,
     record_returns,
     returns_of,
@@ -36,6 +37,13 @@ def test_trainings_differ_by_the_term_alone():
             assert variant == without._replace(idempotence=TERM)
             assert identity(variant) == identity(without) | {"idempotence": TERM}
     assert not set(found) & set(nets())
+
+
+def test_a_training_that_diverged_is_recorded_with_its_epochs():
+    rows = {}
+    record_diverged(SimpleNamespace(record=lambda id, value, **notes: rows.update(
+        {id: (value, notes["scale"])})))
+    assert rows == {"nclaw.idempotence.water-idempotent-start.epochs": (184, "of 300 epochs")}
 
 
 @pytest.mark.parametrize(("pair", "share"), [
