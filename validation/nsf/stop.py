@@ -1,8 +1,9 @@
 """The end of Gauss-Newton (NSF-eq10, section 5.3): with a tolerance on the change of the latent
 coordinates beside none, with which only round-off is left to gain.
 
-The bounds were set when trials of the same cases were known: with 1e-6 the errors of positions and stress change by at most 1e-3 of
-themselves, and a run's median step takes at most the 3 iterations that the paper prints.
+The bounds were set when trials of the same cases were known: with 1e-6 the errors of positions and
+stress change by at most 1e-3 of themselves, and a run's median step takes at most the 3 iterations
+that the paper prints.
 """
 
 from itertools import islice
