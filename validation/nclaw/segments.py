@@ -90,13 +90,14 @@ def record_memory(run, costs, steps):
     """Record the memory of {keep_every: `EpochCost`s}, of the epoch and of the process."""
     rule = {"unit": "GB", "scale": scale_of(steps), "scatter": SCATTER}
     few, everything = (largest(costs[keep], "memory") for keep in (FEW, ALL))
+    process, whole = (largest(costs[keep], "process") for keep in (FEW, ALL))
     run.record("nclaw.segments.memory", few, comparator="<=", bound=MOST_GB * steps / FULL, **rule,
                note=f"of the epoch, beside {everything:.3g} GB with all states kept: largest "
                     "resident memory in it, less that before")
-    run.record("nclaw.segments.process", largest(costs[FEW], "process"), **rule,
+    run.record("nclaw.segments.process", process, **rule,
                **full_rule(steps, MOST_GB),
                note="of the entire process with libraries and the observed run, beside "
-                    f"{largest(costs[ALL], 'process'):.3g} GB with all states kept")
+                    f"{whole:.3g} GB with all states kept")
     run.record("nclaw.segments.saved", everything / few, unit="1", scatter=SCATTER,
                scale=scale_of(steps), comparator="info",
                note="memory of an epoch that keeps all states over that of one that keeps few")
@@ -109,8 +110,9 @@ def largest(costs, name):
 
 def record_time(run, costs, steps):
     """Record the CPU time of {keep_every: `EpochCost`s}, and its ratio, judged at the full size."""
-    few, everything = (float(np.median([one.cpu for one in costs[keep]])) for keep in (FEW, ALL))
-    text = f"median of {len(costs[FEW])} in turn, one thread"
+    times = [[one.cpu for one in costs[keep]] for keep in (FEW, ALL)]
+    few, everything = (float(np.median(each)) for each in times)
+    text = f"median of {len(times[0])} in turn, one thread"
     run.record("nclaw.segments.time", few / everything, unit="x", scale=scale_of(steps),
                **full_rule(steps, MOST_TIME),
                note=f"CPU time of an epoch, over that with all states kept; {text}")
