@@ -18,7 +18,7 @@ class Region(NamedTuple):
     def including(self, x):
         """Return the smallest `Region` that has this one and all finite points x (n, 2) [m]."""
         x = x[np.isfinite(x).all(axis=1)]
-        return Region(np.min([self.low, *x], axis=0), np.max([self.high, *x], axis=0))
+        return Region(np.vstack((self.low, x)).min(axis=0), np.vstack((self.high, x)).max(axis=0))
 
 
 def region_around(x):

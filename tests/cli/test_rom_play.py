@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from command_line import assert_told, mpm_ref
 from rich.console import Console
-from small_studies import modelled
+from small_studies import modelled, session_of
 
 from mpm_ref.cli import play_keys, play_terminal
 from mpm_ref.cli.play_loop import FRAME, PlayedTime, played_time
 from mpm_ref.cli.play_terminal import play_on_terminal
 from mpm_ref.cli.rom_play import range_warnings, side_view
-from mpm_ref.rom.study import reduce
-from mpm_ref.rom.study.play import PlayCommand, play_session
+from mpm_ref.rom.study.play import PlayCommand
 from mpm_ref.rom.study.study import load
 
 DT = 0.01       # of the study's steps [s]
@@ -31,8 +30,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture
 def session(made):
-    bars = load(made / "bars.toml")
-    return play_session(bars, reduce.load(made / "map.npz", bars), [2.5], (0, 1))[0]
+    return session_of(made)
 
 
 def play(made, *options, map="map.npz"):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from small_studies import modelled
+from small_studies import modelled, session_of
 
 from mpm_ref.rom.study import play, reduce
 from mpm_ref.rom.study.full_model import ldm_full_model
@@ -30,8 +30,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture
 def session(made):
-    bars = load(made / "bars.toml")
-    return play_session(bars, reduce.load(made / "map.npz", bars), [G], (0, 1))[0]
+    return session_of(made, G)
 
 
 def obey(session, *commands):

@@ -5,6 +5,7 @@ from edited_text import write_edited
 from mpm_ref.rom import model_file
 from mpm_ref.rom.study import dataset, reduce
 from mpm_ref.rom.study.generate import FINISHED, generate
+from mpm_ref.rom.study.play import play_session
 from mpm_ref.rom.study.study import load
 from mpm_ref.store.results import Results
 
@@ -51,6 +52,12 @@ r = 3
 
 CURVED = (("r = 3", "r = 2\nmodes = 4"), ('"modes"', '"curved"'),
           ("[map]", '[run]\nprojection = "nonlinear"\n\n[map]'))     # edits
+
+
+def session_of(folder, g=2.5):
+    """A session of `mpm-ref rom play` with the study and the map that `modelled` made."""
+    study = load(folder / "bars.toml")
+    return play_session(study, reduce.load(folder / "map.npz", study), [g], (0, 1))[0]
 
 
 def write(folder, *edits, scene=SCENE):

@@ -6,10 +6,11 @@ from mpm_ref.materials.learned.weights import errors_include_velocities
 from mpm_ref.nclaw.gnn.simulator import Simulator
 
 from ..common.registry import experiment
+from .diverged_trainings import diverged_trainings, record_epochs
 from .simulators import GraphNet
 from .strain_bounds import LABELED
 from .tables import available_laws, method_of
-from .trained_laws import diverged, identity, nets
+from .trained_laws import nets
 
 STEP = {"unit": "m^2", "note": "mean over steps from restarts of the horizon of that epoch"}
 MIXED = {"unit": "m^2", "note": f"{STEP['note']}; the loss's term of velocities is in it, which "
@@ -39,15 +40,12 @@ def loss(run):
 def diverged_rows(run):
     """Record the epochs of the trainings that diverged, and return their rows."""
     rows = []
-    for name, net in nets().items():
-        about = None if isinstance(net, GraphNet) else diverged(name, identity(net))
-        if about is None:
-            continue
-        method, errors = method_of(name, net), about["errors"]
-        run.record(f"nclaw.loss.{method}.{net.environment}.epochs", len(errors), unit="epochs",
-                   comparator="info", scale=f"of {net.epochs} epochs",
-                   note=f"the training diverged: {about['stopped']}")
-        rows += table_rows(method, net.environment, errors, error_kind(method, about))
+    laws = {name: net for name, net in nets().items() if not isinstance(net, GraphNet)}
+    for name, about in diverged_trainings(laws).items():
+        net = laws[name]
+        method = method_of(name, net)
+        record_epochs(run, f"nclaw.loss.{method}.{net.environment}", about, net.epochs)
+        rows += table_rows(method, net.environment, about["errors"], error_kind(method, about))
     return rows
 
 

@@ -12,6 +12,7 @@ from mpm_ref.nclaw.camera import project
 from ..common.registry import experiment
 from ..common.weights_needed import load_available
 from ..ldm.published_bodies import keep
+from .diverged_trainings import diverged_trainings, record_epochs
 from .dough import (
     EVERY,
     FRAMES_PER_SECOND,
@@ -29,7 +30,6 @@ from .dough import (
 )
 from .initial_laws import untrained
 from .states import shots
-from .trained_laws import diverged
 
 BODIES = {"block": block, "star": star}
 COLUMNS = ("laws", "pixels", "block", "star", "broken")
@@ -69,12 +69,8 @@ def dough(run):
 def contestants(run):
     """Return {name: function that gives a body other laws}; record which weights are missing."""
     laws = load_available(run, doughs(), trained)
-    for name, net in doughs().items():
-        about = diverged(name, identity(net))
-        if about is not None:
-            run.record(f"nclaw.dough.{name}.epochs", len(about["errors"]), unit="epochs",
-                       comparator="info", scale=f"of {net.epochs} epochs",
-                       note=f"the training diverged: {about['stopped']}")
+    for name, about in diverged_trainings(doughs(), identity).items():
+        record_epochs(run, f"nclaw.dough.{name}", about, doughs()[name].epochs)
     return {"true": copy_body, "guess": guessed, "init": body_maker(untrained()),
             **{name: body_maker(one) for name, one in laws.items()}}
 

@@ -27,12 +27,13 @@ from ..common.scenes import threads_for
 from ..common.weights_needed import load_available
 from ..extremes.nclaw_extrapolation import with_time_step
 from .dissipation import TRUE, MaterialLaws
+from .diverged_trainings import diverged_trainings, record_epochs
 from .environments import environment
 from .errors import COLUMNS, OURS, errors, grouped, quick_note, scale
 from .evaluate import ComparedError, body_maker, compare
 from .longer_horizons import continued_laws
 from .printed_ids import error_id
-from .trained_laws import diverged, identity, nets, trained
+from .trained_laws import nets, trained
 
 TERM = 0.3              # weight of the term [m^2]
 VARIANTS = "again", "idempotent", "idempotent-start"
@@ -94,23 +95,14 @@ def idempotence(run):
 def available_laws(run):
     """Return {method: {environment: laws}} of those that are trained; record others."""
     printed = load_available(run, NAMES, trained)
-    record_diverged(run)
-    going = [name for name, net in idempotent_nets().items()
-             if diverged(name, identity(net)) is None]
-    later = load_available(run, going, idempotent_laws)
+    all_nets = idempotent_nets()
+    lost = diverged_trainings(all_nets)
+    for name, about in lost.items():
+        record_epochs(run, f"nclaw.idempotence.{name}", about, all_nets[name].epochs)
+    later = load_available(run, [name for name in all_nets if name not in lost], idempotent_laws)
     by_method = {OURS: printed, **{word: {name: later[f"{name}-{word}"] for name in NAMES
                                           if f"{name}-{word}" in later} for word in VARIANTS}}
     return {method: laws for method, laws in by_method.items() if laws}
-
-
-def record_diverged(run):
-    """Record the epochs of trainings that diverged."""
-    for name, net in idempotent_nets().items():
-        about = diverged(name, identity(net))
-        if about is not None:
-            run.record(f"nclaw.idempotence.{name}.epochs", len(about["errors"]), unit="epochs",
-                       comparator="info", scale=f"of {net.epochs} epochs",
-                       note=f"the training diverged: {about['stopped']}")
 
 
 def material_laws(laws):

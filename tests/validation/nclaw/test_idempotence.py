@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mpm_ref.materials import FixedCorotated, Fluid, FluidProjection, NoFlow
+from validation.nclaw import idempotence
 from validation.nclaw.dissipation import TRUE, MaterialLaws
 from validation.nclaw.errors import ErrorRow
 from validation.nclaw.idempotence import (
@@ -16,7 +17,6 @@ from validation.nclaw.idempotence import (
     idempotent_nets,
     material_laws,
     passed_on,
-    record_diverged,
     record_errors,
     record_returns,
     returns_of,
@@ -39,11 +39,15 @@ def test_trainings_differ_by_the_term_alone():
     assert not set(found) & set(nets())
 
 
-def test_a_training_that_diverged_is_recorded_with_its_epochs():
-    rows = {}
-    record_diverged(SimpleNamespace(record=lambda id, value, **notes: rows.update(
-        {id: (value, notes["scale"])})))
+def test_a_training_that_diverged_is_recorded_with_its_epochs(monkeypatch):
+    rows, asked = {}, []
+    run = SimpleNamespace(record=lambda id, value, **notes: rows.update(
+        {id: (value, notes["scale"])}))
+    monkeypatch.setattr(idempotence, "load_available",
+                        lambda run, names, load: asked.extend(names) or {})
+    idempotence.available_laws(run)
     assert rows == {"nclaw.idempotence.water-idempotent-start.epochs": (184, "of 300 epochs")}
+    assert asked == ["water", "water-again", "water-idempotent"]
 
 
 @pytest.mark.parametrize(("pair", "share"), [
