@@ -93,7 +93,7 @@ def test_a_session_that_broke_down_has_status_3(made):
 
 
 def test_a_breakdown_is_remembered_after_a_restart(made):
-    done, found = facts_of(made, "--seconds", 0.3, "--set", "g=1e4", "--keys", "0.25 r")
+    done, found = facts_of(made, "--seconds", 0.3, "--set", "g=1e4", "--keys", "0.25 r, 0.25 space")
     assert done.exit_code == 3
     assert found["breakdown"] in done.stderr
 
