@@ -61,14 +61,22 @@ def observed_scene(scene):
 
 
 def searched(scene, observed, budget):
-    """Return a finished `LimitsSearch` of a scene, of runs that begin within a budget [s]."""
+    """Return a finished `LimitsSearch` of a scene, of runs that begin within a budget [s], in which
+    the scene as given and its references, and the compilation of their kernels, do not count.
+    """
     with open_executor(workers=1) as executor:
-        runs = SceneRuns(observed, executor, RunStore(), budget)
-        judge = CellJudge(scene, runs, observed.probes, (QUANTITY,), ERROR)
+        store = RunStore()
+        judge_of(scene, SceneRuns(observed, executor, store)).start()
+        judge = judge_of(scene, SceneRuns(observed, executor, store, budget))
         judge.start()
         search = LimitsSearch(judge)
         search.run()
     return search
+
+
+def judge_of(scene, runs):
+    """Return the `CellJudge` of a scene and its `SceneRuns`."""
+    return CellJudge(scene, runs, runs.probes, (QUANTITY,), ERROR)
 
 
 def cell_rows(name, judge):

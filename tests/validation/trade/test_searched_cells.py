@@ -97,3 +97,9 @@ def test_a_search_gives_rows_of_all_its_cells():
     rows = cell_rows("flight", search.judge)
     assert rows[0][:3] == ["flight", "as given", RIGHT]
     assert len(rows) == len(search.judge.verdicts)
+
+
+def test_the_scene_as_given_does_not_count_in_the_budget():
+    scene = next(one.scene for one in advice_scenes() if one.name == "flight")
+    search = searched(scene, observed_scene(scene), 0.0)
+    assert cell_rows("flight", search.judge)[0][:3] == ["flight", "as given", RIGHT]
