@@ -16,11 +16,13 @@ from mpm_ref.store.text import counted
 
 from ..common.even_points import even_subset
 from ..common.registry import experiment
-from ..common.scenes import catalogue_scene, evenly
+from ..common.scenes import catalogue_scene, evenly, with_
 from ..ldm.published_bodies import keep
 from .real_bodies import BODIES, bodies_text, with_real_bodies
 from .run_history import COLUMNS, run_history, unpublished
-from .sizes import AFFORDABLE, SIZES, sized
+from .sizes import AFFORDABLE, SIZES
+from .warm_states import catalogue_name
+from .warm_states import scene as sized_scene
 
 METHOD = "hot"
 ROWS = 500          # of the table, at most
@@ -30,15 +32,18 @@ PATIENCE = 3600     # CPU seconds of a whole run, at most, unless it is of the p
 PRINTED_ENDS = {"boxes": 0.5}   # [s] of motion at the printed size, where all of it takes hours
 
 
-def scene_experiment(scene, seconds, quick=None):
+def scene_experiment(scene, seconds, quick=None, printed_size=True):
     """Declare the experiment ``hot.scenes.<scene>``, which takes about `seconds`.
 
-    `quick`: seconds of the motion that the quick profile runs, where it does.
+    `quick`: seconds of the motion that the quick profile runs, where it does. printed_size: whether
+    the paper profile runs it, where the paper prints a size.
     """
-    profiles = ["standard"] + ["quick"] * bool(quick)
-    profiles += ["paper"] * (SIZES[f"hot_{scene}"].paper is not None)
+    printed_size = printed_size and SIZES[f"hot_{catalogue_name(scene)}"].paper is not None
+    profiles = ["standard"] + ["quick"] * bool(quick) + ["paper"] * printed_size
 
-    @experiment(f"hot.scenes.{scene}", title=f"{scene.capitalize()}: a whole run by HOT",
+    title = scene.replace("_", ", ").capitalize()
+
+    @experiment(f"hot.scenes.{scene}", title=f"{title}: a whole run by HOT",
                 profiles=profiles, budget={"quick": 6, "standard": seconds, "paper": 1e5})
     def whole_run(run):
         """Run the scene and record the work of its steps."""
@@ -46,7 +51,7 @@ def scene_experiment(scene, seconds, quick=None):
         end = run.choose(quick={"end": quick}, standard={}, paper=printed)
         size, patience = run.choose(quick=("quick", PATIENCE), standard=("standard", PATIENCE),
                                     paper=("paper", inf))
-        record = sized(f"hot_{scene}", size, unstable="allow", **end)
+        record = with_(sized_scene(scene, size), **end)
         if run.profile == "paper" and scene in BODIES:
             record = printed_bodies(run, scene, record)
         record_run(run, scene, record, patience)
@@ -118,7 +123,7 @@ def record_end(run, name, history):
 
 def record_beginning(run, name, history):
     """Record how much of the scene's motion a run was asked for, where it is not all."""
-    asked, whole = history.facts["end"], catalogue_scene(f"hot_{name}").end
+    asked, whole = history.facts["end"], catalogue_scene(f"hot_{catalogue_name(name)}").end
     if asked < whole:
         run.record(f"hot.scenes.{name}.asked", asked / whole, unit="1", comparator="info",
                    scale=scale_text(history), note=f"share of the scene's {whole:.3g} s that this "
@@ -150,6 +155,7 @@ twist = scene_experiment("twist", 1200)
 faceless = scene_experiment("faceless", 70)
 boards = scene_experiment("boards", 1100)
 armacat = scene_experiment("armacat", 260)
+armacat_soft = scene_experiment("armacat_soft", 260, printed_size=False)
 chain = scene_experiment("chain", 2300)
 aluminium = scene_experiment("aluminium", 170)
 stiffness = scene_experiment("stiffness", 70)

@@ -145,7 +145,21 @@ def test_a_run_of_the_beginning_says_so(history, share):
 
 def test_every_scene_has_a_whole_run():
     experiments = {id for id in discover().experiments if id.startswith("hot.scenes.")}
-    assert experiments - {real_counts.ID} == {name.replace("hot_", "hot.scenes.") for name in SIZES}
+    names = {*(name.removeprefix("hot_") for name in SIZES), "armacat_soft"}
+    assert experiments - {real_counts.ID} == {f"hot.scenes.{name}" for name in names}
+
+
+def test_the_soft_cat_alone_is_softer_in_its_run(monkeypatch):
+    seen = {}
+    monkeypatch.setattr(whole_runs, "record_run",
+                        lambda run, name, scene, patience: seen.update({name: scene}))
+    run = SimpleNamespace(profile="standard", choose=lambda **values: values["standard"])
+    for name in ("armacat", "armacat_soft"):
+        discover().experiments[f"hot.scenes.{name}"].function(run)
+    stiff, soft = ({body.name: body for body in scene.body} for scene in seen.values())
+    assert (stiff["cat"].material.E, soft["cat"].material.E) == (1e9, 1e6)
+    soft["cat"] = with_(soft["cat"], material=stiff["cat"].material)
+    assert soft == stiff
 
 
 # Pictures
