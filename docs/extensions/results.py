@@ -16,7 +16,7 @@ from validation.common.registry import GROUPS, discover
 from validation.common.report import chapters
 from validation.common.results import RESULTS, ProfileResults
 
-from . import atlas, mutation_page, paper_figures, settings, verdict_pages
+from . import atlas, mutation_page, paper_figures, settings, verdict_pages, which_model
 from .markdown import cell, grid_table
 
 FOLDER = "results/numbers"
@@ -63,7 +63,9 @@ def pages():
     result |= verdict_pages.pages(printed, rows)
     result |= paper_figures.pages(printed, rows, images())
     result |= atlas.pages(shown_experiments())
-    return result | mutation_page.pages() | settings.pages(ProfileResults(RESULTS / "standard"))
+    standard = ProfileResults(RESULTS / "standard")
+    return (result | mutation_page.pages() | settings.pages(standard)
+            | which_model.pages(standard))
 
 
 @cache
