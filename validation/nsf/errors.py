@@ -65,7 +65,7 @@ def record_study(run, name, one, draws):
     few = error_rows(one, "modal", one.study.samples, draws)
     record_mean(run, f"{name}.error.{MODES}", few, one.scale, f"{one.study.samples} samples")
     record_nearest(run, name, one)
-    few += record_cubature(run, f"{name}.cubature", one, one.study.samples, draws)
+    few += record_weighted(run, f"{name}.error", one, one.study.samples, draws)
     return few + record_all_samples(run, name, one) + record_longer_steps(run, name, one)
 
 
@@ -123,11 +123,11 @@ def record_variant(run, name, one, word, note):
     return rows
 
 
-def record_cubature(run, name, one, count, draws):
+def record_weighted(run, name, one, count, draws):
     """Record the errors with samples weighted by cubature; return their rows."""
     rows = error_rows(one, "cubature", count, draws, weighted=True)
-    record_mean(run, name, rows, one.scale, f"at most {count} samples with weights by cubature, of "
-          f"random candidates; {weights_note(rows)}", comparator="info")
+    record_mean(run, f"{name}.{MODES}.weighted", rows, one.scale, f"at most {count} samples with "
+                f"weights by cubature, of random candidates; {weights_note(rows)}")
     return rows
 
 

@@ -9,11 +9,11 @@ from .errors import (
     error_rows,
     mean,
     record_all_samples,
-    record_cubature,
     record_longer_steps,
     record_map_alone,
     record_mean,
     record_nearest,
+    record_weighted,
     record_without_affine,
 )
 from .reduced_runs import fit_study
@@ -67,7 +67,7 @@ def cut(run):
     run.record(f"nsf.cake.integration_particles.{MODES}" if printed_size else "nsf.cake.points",
                mean(rows, "points"), scale=one.scale, **({} if printed_size
                                                          else {"comparator": "info"}))
-    rows += record_cubature(run, "nsf.cake.cubature", one, one.study.samples, draws(run))
+    rows += record_weighted(run, "nsf.cake.error", one, one.study.samples, draws(run))
     run.table("errors", COLUMNS, rows + record_variants(run, "nsf.cake", one))
     keep_states(run, one, one.study.test)
 
@@ -92,7 +92,7 @@ def record_counts(run, name, one, counts):
     for count in run.choose(quick=counts[:1], standard=counts, paper=counts):
         drawn = error_rows(one, "modal", count, draws(run))
         record_mean(run, f"{name}.error.{count}.{MODES}", drawn, one.scale, f"{count} samples")
-        rows += drawn + record_cubature(run, f"{name}.cubature.{count}", one, count, draws(run))
+        rows += drawn + record_weighted(run, f"{name}.error.{count}", one, count, draws(run))
     rows += record_all_samples(run, name, one) + record_variants(run, name, one)
     run.table("errors", COLUMNS, rows)
 
@@ -102,7 +102,7 @@ def record_with_map_alone(run, name, one):
     study = one.study
     few = error_rows(one, "modal", study.samples, draws(run))
     record_mean(run, f"{name}.error.{MODES}", few, one.scale, f"{study.samples} samples")
-    few += record_cubature(run, f"{name}.cubature", one, study.samples, draws(run))
+    few += record_weighted(run, f"{name}.error", one, study.samples, draws(run))
     rows = few + record_all_samples(run, name, one) + record_map_alone(run, name, one)
     keep_states(run, one, study.test[1:2] or study.test, ("map",))
     run.table("errors", COLUMNS, rows + record_variants(run, name, one))

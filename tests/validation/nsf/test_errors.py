@@ -142,10 +142,10 @@ def test_samples_of_a_study_may_be_those_of_cells(cube):
 
 def test_records_of_weighted_samples_say_how_many_there_are(cube):
     records = Records()
-    row, = errors.record_cubature(records, "nsf.jelly.cubature", cube, 20, (0,))
+    row, = errors.record_weighted(records, "nsf.jelly.error", cube, 20, (0,))
     found = cube.errors(TEST, 20, weighted=True)
     assert row[errors.COLUMNS.index("kept")] == found.samples
-    value, note = records["nsf.jelly.cubature"]
+    value, note = records["nsf.jelly.error.modes.weighted"]
     assert value == 100.0 * found.errors.origin
     assert (f"at most 20 samples with weights by cubature, of random candidates; {found.samples:g} "
             f"kept, whose weights leave {found.misfit:.2g} of the modes' products") in note
