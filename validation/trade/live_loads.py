@@ -46,7 +46,7 @@ BODIES = QUICK | {"400-apic": LiveBody(0.04, 6, "apic"), "13k": LiveBody(0.0125,
 
 
 @experiment("trade.reduced-live", title="Reduced models under loads known while the run goes on",
-            profiles=("quick", "standard"), budget={"quick": 8, "standard": 300})
+            profiles=("quick", "standard"), budget={"quick": 8, "standard": 400})
 def reduced_live(run):
     """Measure every method at each size; record whether LDM pays."""
     threads = numba.get_num_threads()
