@@ -37,7 +37,7 @@ class LiveBody(NamedTuple):
     """The study's body at a size; transfer None: that of the study."""
 
     dx: float                   # [m]
-    modes: int                  # of LDM
+    modes: int                  # of LDM: the study's, or the best of 4, 6 and 30
     transfer: str | None = None
 
 
