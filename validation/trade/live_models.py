@@ -1,4 +1,4 @@
-"""What is computed from training runs under constant gravity for runs under one that changes: LDM's
+"""Models computed from training runs under constant gravity, for runs under one that changes: LDM's
 modes, responses to steps that are superposed, and a correction of coarse runs.
 """
 
