@@ -1,0 +1,141 @@
+"""Reduced models under loads that are known only while the run goes on: error of the displacement
+against CPU time, on the bundled study `sway`, whose training runs are responses to steps.
+
+Errors are those of agreement with the full-order run on the same grid, by the transfer of the
+training runs. CPU times are of the steps and of the positions at the levels, on one thread.
+"""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from mpm_ref.core.jit import set_threads
+
+from ..common.registry import experiment
+from .arm_models import FEW
+from .live_models import corrected_method, ldm_method, superposition_method
+from .live_runs import (
+    coarse_method,
+    drawn_loads,
+    full_method,
+    played,
+    points_of,
+    sized,
+    step_training,
+    sway,
+    training_gravity,
+)
+from .reduced import COLUMNS, ArmCost, errors
+
+COARSER = (1.5, 2.0, 4.0)       # times as coarse
+CORRECTED = (2.0, 4.0)          # ... of the runs that are corrected
+SEED = 1                        # of the loads; settings were chosen on those of seed 0
+
+
+class LiveBody(NamedTuple):
+    """The study's body at a size; transfer None: that of the study."""
+
+    dx: float                   # [m]
+    modes: int                  # of LDM: the study's, or the best of 4, 6 and 30
+    transfer: str | None = None
+
+
+QUICK = {"400": LiveBody(0.04, 6)}
+BODIES = QUICK | {"400-apic": LiveBody(0.04, 6, "apic"), "13k": LiveBody(0.0125, 4)}
+
+
+@experiment("trade.reduced-live", title="Reduced models under loads known while the run goes on",
+            profiles=("quick", "standard"), budget={"quick": 8, "standard": 400})
+def reduced_live(run):
+    """Measure every method at each size; record whether LDM pays."""
+    threads = numba.get_num_threads()
+    set_threads(1)
+    try:
+        compare_bodies(run)
+    finally:
+        set_threads(threads)
+
+
+def compare_bodies(run):
+    """Record all methods of all bodies."""
+    study, rows = sway(), []
+    gravity = training_gravity(study)
+    loads = drawn_loads(gravity, run.choose(quick=1, standard=3), SEED)
+    for size, body in run.progress(run.choose(quick=QUICK, standard=BODIES).items(), "bodies"):
+        first = study.scene(study.mu[0])
+        scenes = {times: sized(first, times * body.dx, body.transfer) for times in (1.0, *COARSER)}
+        modes = body.modes, study.tables.reduced_model.r
+        costs = measured((size, points_of(scenes[1.0])), [*methods(scenes, gravity, modes)], loads)
+        record_body(run, f"trade.reduced-live.{size}", costs,
+                    f"{costs[0].particles} particles, {len(gravity)} training runs, "
+                    f"{len(loads)} loads")
+        rows += costs
+    run.table("methods", COLUMNS, rows)
+
+
+def methods(scenes, gravity, modes):
+    """Yield the `LiveMethod`s of scenes {times as coarse: scene}, that of the reference first, with
+    training runs under gravity (runs, 3) [m/s^2]; modes: LDM's number of them, and the study's.
+    """
+    scene, (r, r_study) = scenes[1.0], modes
+    training = step_training(scene, gravity)
+    yield full_method(scene)
+    yield full_method(by_mls(scene))
+    for times in COARSER:
+        for one in (scenes[times], by_mls(scenes[times])):
+            yield coarse_method(one, times, training.X)
+    for times in CORRECTED:
+        yield corrected_method(training, step_training(scenes[times], gravity), times)
+    yield ldm_method("ldm", training, r)
+    yield ldm_method("ldm.few", training, r, FEW)
+    if r != r_study:
+        yield ldm_method("ldm.study", training, r_study)
+    yield superposition_method(training)
+
+
+def by_mls(scene):
+    """Return a scene with MLS-MPM as its transfer, the fastest."""
+    return sized(scene, scene.dx, "mls")
+
+
+def measured(body, methods, loads):
+    """Return the `ArmCost` of each `LiveMethod` of a body (size, points at rest), compared with the
+    first; what is compiled or read with a method's first tick is not counted.
+    """
+    (size, X), runs = body, []
+    for method in methods:
+        played(method, loads[0][:1])
+        runs.append([played(method, load) for load in loads])
+    return [ArmCost(size, len(X), method.name, *errors(X, own, runs[0]),
+                    float(np.mean([one.cpu for one in own])), method.fit, method.data,
+                    method.pairs, method.settings)
+            for method, own in zip(methods, runs, strict=True)]
+
+
+def record_body(run, name, rows, scale):
+    """Record the error of each method that comes to its end, and what LDM gains over others."""
+    full = rows[0]
+    for row in (row for row in rows[1:] if np.isfinite(row.error)):
+        run.record(f"{name}.{row.method}", 100.0 * row.error, unit="%", comparator="info",
+                   scale=scale, note=f"of the displacement, worst load {100.0 * row.worst:.3g} %; "
+                   f"a run takes {row.cpu_run:.3g} CPU s, {full.method} {full.cpu_run:.3g}; before "
+                   f"the first run {row.first:.3g}{'; ' + row.settings if row.settings else ''}")
+    one = {row.method: row for row in rows}
+    record_gain(run, name, rows, scale)
+    run.record(f"{name}.ldm.beats-superposition",
+               one["superposition"].error / one["ldm"].error, unit="x", comparator=">=", bound=1.0,
+               scale=scale, note="error of superposed responses over that of LDM")
+
+
+def record_gain(run, name, rows, scale):
+    """Record how many times LDM's CPU time the cheapest other method takes with at most its error;
+    one that broke down gains nothing.
+    """
+    ldm = next(row for row in rows if row.method == "ldm")
+    others = [row for row in rows if not row.method.startswith("ldm") and row.error <= ldm.error]
+    cheapest = min(others, key=lambda row: row.cpu_run)
+    gain = cheapest.cpu_run / ldm.cpu_run if np.isfinite(ldm.error) else 0.0
+    run.record(f"{name}.ldm.gain", gain, unit="x", comparator=">=", bound=1.0,
+               scale=scale, note=f"CPU time of a run of {cheapest.method}, the cheapest with at "
+               "most LDM's error, over LDM's")

@@ -1,0 +1,95 @@
+"""Models computed from training runs under constant gravity, for runs under one that changes: LDM's
+modes, responses to steps that are superposed, and a correction of coarse runs.
+"""
+
+from functools import partial
+from time import process_time
+
+import numpy as np
+
+from mpm_ref.rom.correction import carrier, fit_correction
+from mpm_ref.rom.fields.numbered import numbered
+from mpm_ref.rom.fields.pod import modes
+from mpm_ref.rom.study.full_model import field_of, ldm_full_model
+from mpm_ref.rom.study.run import RunOptions, ldm_run
+
+from .arm_models import CORRECTIONS
+from .live_runs import TICKS, LiveMethod, full_states
+
+
+def ldm_method(name, training, r, count=None):
+    """Return the `LiveMethod` of LDM on r modes of a `StepTraining`, with `count` samples, or
+    all.
+    """
+    clock, X = process_time(), training.X
+    g = modes(X, np.concatenate(training.x), np.concatenate(training.F), r)
+    fit, points = process_time() - clock, np.arange(len(X))
+    return LiveMethod(name, partial(reduced_states, training.scene, g, RunOptions(points=count)),
+                      partial(numbered(g).place, points), fit, training.cpu,
+                      settings=f"r = {r}, {count or 'all'} samples")
+
+
+def reduced_states(scene, g, options, load):
+    """Return the iterator over the latent coordinates of a reduced run on a map g after each tick
+    of a load.
+    """
+    plan = ldm_run(ldm_full_model(scene), g, options, np.zeros(g.r))
+    latent = plan.find_start()
+    return reduced_steps(plan, latent, plan.make_sampler(latent.xhat), load)
+
+
+def reduced_steps(plan, latent, sampler, load):
+    """Yield the latent coordinates of a `ReducedRun` after each tick of a load."""
+    step = 0
+    for gravity in load:
+        plan.stepper.gravity = gravity
+        for _ in range(plan.steps // TICKS):
+            t = step * plan.dt
+            samples = sampler(t, latent)
+            latent, _ = plan.stepper.step(latent, samples.points, t, plan.dt, samples.weights)
+            step += 1
+        yield latent.xhat
+
+
+def superposition_method(training):
+    """Return the `LiveMethod` of a linear body: a jump of gravity adds the response to a step.
+
+    u(t) = sum_k S(t - t_k) dg_k, where S is linear in the components of gravity that the training
+    runs vary, fitted to them by least squares.
+    """
+    clock, X = process_time(), training.X
+    responses = np.tensordot(np.linalg.pinv(training.gravity), training.x - X, axes=1)
+    return LiveMethod("superposition", jumps, partial(superposed, X, responses),
+                      process_time() - clock, training.cpu)
+
+
+def jumps(load):
+    """Yield after each tick of a load the jumps of gravity so far, {their age in ticks: (3,)}."""
+    ages, last = {}, np.zeros(3)
+    for gravity in load:
+        ages = {age + 1: jump for age, jump in ages.items()}
+        if (gravity != last).any():
+            ages[1] = gravity - last
+        last = gravity
+        yield ages
+
+
+def superposed(X, responses, ages):
+    """Return x (n, 3) of points X after jumps (see `jumps`), by responses (3, TICKS, n, 3)."""
+    x = X.copy()
+    for age, jump in ages.items():
+        for axis in np.flatnonzero(jump):
+            x += jump[axis] * responses[axis, age - 1]
+    return x
+
+
+def corrected_method(training, coarse, times):
+    """Return the `LiveMethod` of a run on a grid `times` as coarse with a correction learned from a
+    `StepTraining` on each of the two grids.
+    """
+    clock, one = process_time(), carrier(training.X, coarse.X)
+    x, x_coarse = np.concatenate(training.x), np.concatenate(coarse.x)
+    fit = fit_correction(one, x, x_coarse, CORRECTIONS, np.arange(len(x)) // TICKS)
+    return LiveMethod(f"corrected.{times:g}", partial(full_states, coarse.scene),
+                      lambda bodies: fit.place(field_of(bodies, "x")), process_time() - clock,
+                      training.cpu, coarse.cpu, f"smoothing {fit.smoothing:g}")
