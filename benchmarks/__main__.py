@@ -231,7 +231,7 @@ def implicit_features(
     repeats: int = 5,
     out: Path = Path("results/benchmarks/implicit_features.json"),
 ):
-    """Measure the CPU time of an implicit step with friction, MLS, or a plastic potential."""
+    """Measure the CPU time of implicit steps with each feature, from friction to a source."""
     from mpm_ref.core.jit import set_threads
 
     from .implicit_features import implicit_rows

@@ -22,7 +22,7 @@ from validation.hot.warm_states import following_steps, warm_state
 SCENES = Path(__file__).parent / "scenes"
 VARIANTS = {                        # the first is what the others are relative to
     "hot": printed("hot"),
-    "hot as released": released("hot"),
+    "hot, options of the release": released("hot"),
     "hot-plus": printed("hot-plus"),
     "pn-mgpcg, flexible": printed("pn-mgpcg", flexible=True),
 }
@@ -79,10 +79,11 @@ def timed(step, options):
 
 
 def first_increment(pose, options):
-    """Return the increment (n, d) [m/s] near which options let a solve start; None: at rest."""
-    if options.start != "gravity":
-        return None
-    return np.broadcast_to(pose.gravity_increment, pose.unknowns.dv0.shape)
+    """Return the increment (n, d) [m/s] near which options, not those of the scene, let a solve
+    start: free fall, or the increment that conditions ask for.
+    """
+    dv0 = pose.unknowns.dv0
+    return np.broadcast_to(pose.gravity_increment, dv0.shape) if options.start == "gravity" else dv0
 
 
 def variant_row(variant, done):

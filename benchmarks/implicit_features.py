@@ -50,7 +50,7 @@ class ImplicitVariant(NamedTuple):
 VARIANTS = (
     ImplicitVariant("fixed corotated, APIC, smooth floor"),
     ImplicitVariant("HOT as printed", options={"method": "hot"}, preset=printed),
-    ImplicitVariant("HOT as released", options={"method": "hot"}, preset=released),
+    ImplicitVariant("HOT, options of the release", options={"method": "hot"}, preset=released),
     ImplicitVariant("a jet from a source to a sink", pours=True),
     ImplicitVariant("floor with friction", friction=ROUGH),
     ImplicitVariant("MLS", transfer="mls"),

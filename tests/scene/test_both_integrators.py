@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 
 from mpm_ref.scene import build, load
@@ -25,6 +26,7 @@ def test_shipped_scene_runs(path, integrator):
     for frame in simulate(replace(problem, clock=clock, allow_unstable=integrator == "explicit")):
         state = frame.state
     assert state.step == STEPS
+    assert all(np.isfinite(body.particles.x).all() for body in state.bodies)
     assert integrator == "explicit" or state.solve.converged
 
 

@@ -61,8 +61,9 @@ def observed_scene(scene):
 
 
 def searched(scene, observed, budget):
-    """Return a finished `LimitsSearch` of a scene, of runs that begin within a budget [s], in which
-    the scene as given and its references, and the compilation of their kernels, do not count.
+    """Return a finished `LimitsSearch` of a scene, of runs that begin within a budget [s]. Unlike
+    that of `mpm-ref limits` it begins after the scene as given, its references and the compilation
+    of their kernels.
     """
     with open_executor(workers=1) as executor:
         store = RunStore()
