@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .evolution import EvolvedGradients
 from .kinematics import evaluate
 from .projection import project_position, project_velocity
 
@@ -32,15 +33,16 @@ class Latent(NamedTuple):
     vhat: np.ndarray | None = None      # (r,) their rates [1/s]; None in a model without rates
     before: np.ndarray | None = None    # (r,) coordinates a step ago, which vhat was fitted at;
                                         # None at the start
+    gradients: EvolvedGradients | None = None       # of a run that evolves F, after a step
 
     @property
     def fitted_at(self):
         """Latent coordinates (r,) that the rates were fitted at: at the start, the present ones."""
         return self.xhat if self.before is None else self.before
 
-    def advance(self, xhat, vhat=None):
+    def advance(self, xhat, vhat=None, gradients=None):
         """Return the `Latent` after a step that reached xhat, with rates fitted before it."""
-        return Latent(xhat, vhat, self.xhat)
+        return Latent(xhat, vhat, self.xhat, gradients)
 
 
 def start_state(xhat, vhat=None):

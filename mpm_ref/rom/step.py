@@ -11,6 +11,7 @@ are options, of which the two methods are choices:
     transfer   PIC; ours also APIC and MLS-MPM      APIC
     velocity   dg/dxhat vhat (see `latent`)         difference of positions over the step
     projection of velocities, then positions        of positions (NSF-eq10)
+    F          of the map; ours also evolved        none
 
 `ldm_stepper` and `nsf_stepper` make them. In NSF there is no deformation gradient, no return map
 and no singular value decomposition: the material's memory is in the fields.
@@ -26,6 +27,7 @@ from ..core.grid import OutOfRange, Storage, update
 from ..core.heap import keep_freed_memory
 from ..explicit import Scheme, gather, scatter
 from ..materials import NoFlow
+from .evolution import ORIGINS, EvolvedGradients, evolved
 from .fields import ReducedField
 from .fields.elastic import ElasticMap
 from .kinematics import NoBody
@@ -78,6 +80,8 @@ class ReducedStepper:
                                 # with rates the gradient of its velocity
     velocity: str = "previous"
     v0: np.ndarray | None = None
+    deformation_gradient: str = "map"   # or "evolved", where the quadrature points are material
+                                        # points: see `evolution`
 
     def __post_init__(self):
         d = self.field.dim
@@ -93,6 +97,12 @@ class ReducedStepper:
         if self.has_gradient and self.velocity != "previous":
             raise ValueError(f"velocity = {self.velocity!r} with transfer {self.transfer!r}: "
                              "expected 'previous', whose gradient is known")
+        if self.deformation_gradient not in ORIGINS:
+            raise ValueError(f"deformation_gradient = {self.deformation_gradient!r}: expected one "
+                             "of " + ", ".join(ORIGINS))
+        if self.evolves and (self.quadrature.feather or not self.has_rates):
+            raise ValueError("deformation_gradient = 'evolved': expected 'map', since the points "
+                             "of this quadrature keep no F")
         keep_freed_memory()
         self.scheme = Scheme(self.quadrature.degree, self.transfer)
         self.storage = Storage(self.quadrature.dx, self.scheme.stencil, d)
@@ -101,6 +111,11 @@ class ReducedStepper:
     def has_rates(self):
         """Return whether rates of the latent coordinates are fitted, as LDM does."""
         return isinstance(self.projection, RateProjection)
+
+    @property
+    def evolves(self):
+        """Return whether deformation gradients are evolved, and not the map's."""
+        return self.deformation_gradient != ORIGINS[0]
 
     @property
     def has_gradient(self):
@@ -120,6 +135,8 @@ class ReducedStepper:
             raise NoBody(f"t = {t:.6g} s: no quadrature point near the {len(samples)} samples lies "
                          f"within the body ({cloud.report}); have the latent coordinates left the "
                          "range that the map was trained with?")
+        if self.evolves:
+            cloud = with_gradients(cloud, latent.gradients)
         body, carriers = self.bodies(cloud, latent, dt)
         trial = self.on_grid(body, carriers, t, dt)
         lost = samples[~np.isfinite(trial.x).all(axis=1)]
@@ -130,7 +147,8 @@ class ReducedStepper:
         xhat, vhat, fit = self.project(latent, cloud.samples, trial, dt, weights)
         report = StepReport(len(samples), cloud.report["points"], fit.rank, fit.residual,
                         fit.iterations, fit.converged, cloud.report)
-        return latent.advance(xhat, vhat), report
+        gradients = next_gradients(cloud, body.particles.L, dt) if self.evolves else None
+        return latent.advance(xhat, vhat, gradients), report
 
     def cloud(self, latent, samples):
         """Return the `quadrature.Cloud` of a state with these samples."""
@@ -165,8 +183,13 @@ class ReducedStepper:
         return Body("reduced", particles, None, NoFlow(), np.arange(len(state.x)))
 
     def on_grid(self, body, samples, t, dt):
-        """Return the samples' particles after a step on the grid: their trial state (LDM-alg5)."""
-        gather(samples, self.grid(body, samples, t, dt), self.scheme, dt)
+        """Return the samples' particles after a step on the grid: their trial state (LDM-alg5).
+        Where F is evolved, the body's are updated too.
+        """
+        grid = self.grid(body, samples, t, dt)
+        gather(samples, grid, self.scheme, dt)
+        if self.evolves:
+            gather(body, grid, self.scheme, dt)
         return samples.particles
 
     def grid(self, body, samples, t, dt):
@@ -185,10 +208,26 @@ class ReducedStepper:
         return self.projection(self.field, latent, samples, trial, dt, weights)
 
 
+def with_gradients(cloud, gradients):
+    """Return a `Cloud` whose points have the `EvolvedGradients` of the step before, if any."""
+    if gradients is None:
+        return cloud
+    F = gradients.of(cloud.numbers, cloud.points.F)
+    return cloud._replace(points=cloud.points._replace(F=F))
+
+
+def next_gradients(cloud, L, dt):
+    """Return the `EvolvedGradients` of a `Cloud` after a step with velocity gradients L (n, d, d)
+    [1/s].
+    """
+    return EvolvedGradients(cloud.numbers, evolved(cloud.points.F, L, dt))
+
+
 def ldm_stepper(g, quadrature, law, gravity, projection="linear", **options):
     """Return the `ReducedStepper` of LDM (LDM-alg2) on a deformation map g of a body of an elastic
     law, or of several bodies and their `elastic.BodyLaws`; projection: see
-    `projection.RateProjection`; options: conditions, transfer, velocity, and v0 of several bodies.
+    `projection.RateProjection`; options: conditions, transfer, velocity, deformation_gradient, and
+    v0 of several bodies.
     """
     return ReducedStepper(ElasticMap(g, law), quadrature, RateProjection(projection), gravity,
                           **options)

@@ -24,6 +24,7 @@ TERMS = {BOTH: (1.0, 1.0), NO_F: (0.0, 1.0), NO_V: (1.0, 0.0), NEITHER: (0.0, 0.
 WORKSHOP = "workshop"       # both, lambda_1 = 1e4 instead of lambda_F = 100 (LDMW-X3)
 SHARES = {**TERMS, WORKSHOP: (100.0, 1.0)}
 SEEDS = 3                   # of trainings for torsion
+POKE_NETS = ("poke", "poke-1", "poke-2")
 REPEATED = (7,)             # latent dimensions at which the loss's terms are left out
 
 
@@ -52,7 +53,8 @@ def nets():
     trainings["gravity-r7-printed"] = MapNet(GRAVITY, 7, reading="printed")
     trainings |= {f"torsion-{seed}": MapNet(TORSION, 7, seed=seed, epochs=850)
                   for seed in range(SEEDS)}
-    trainings["poke"] = MapNet(POKES, 6, epochs=300, dense=40, thin=4)
+    trainings |= {name: MapNet(POKES, 6, seed=seed, epochs=300, dense=40, thin=4)
+                  for seed, name in enumerate(POKE_NETS)}
     trainings["tower"] = MapNet(TOWER, 6, reading="tower", latent="modes", epochs=100)
     return trainings | workshop()
 

@@ -20,6 +20,7 @@ class Cloud(NamedTuple):
     V0: np.ndarray          # (n,) volume at rest [m^d]
     samples: Kinematics
     report: dict            # "points": n, and further counts of the quadrature
+    numbers: np.ndarray | None = None   # (n,) of the points, sorted, where they are material ones
 
 
 class Quadrature(Protocol):

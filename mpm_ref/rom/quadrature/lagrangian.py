@@ -60,7 +60,7 @@ def cloud_of(body, chosen, g, xhat, samples):
     """
     at = evaluate(g, body.X[chosen], xhat)
     return Cloud(at, body.m[chosen], body.V0[chosen], at.select(np.searchsorted(chosen, samples)),
-                 {"points": len(chosen)})
+                 {"points": len(chosen)}, chosen)
 
 
 class Resampled(NamedTuple):

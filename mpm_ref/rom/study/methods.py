@@ -29,6 +29,7 @@ from .run import (
     ldm_run,
     nsf_run,
     require_boundary_cells,
+    require_material_points,
     require_own_points,
 )
 from .samples import (
@@ -80,6 +81,7 @@ def require_ldm_options(study, full):
     require_one_body(study)
     require_own_points(full, options)
     require_boundary_cells(full, options)
+    require_material_points(options)
     require_prescribed_region(full, options)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...sampling import Regular, sample
 from ...shapes.inside import solid
+from ..evolution import ORIGINS
 from ..fields.blocks import body_blocks
 from ..fields.numbered import is_numbered, numbered
 from ..fields.pod import PodModes
@@ -60,9 +61,12 @@ class ReducedRun(NamedTuple):
     def states(self, earlier=()):
         """Yield the `RunState` of all time levels, the start first. earlier: (`Latent`, `Report` or
         None) of the first states, if these are known; their samples are drawn again, so that those
-        of later steps are the run's.
+        of later steps are the run's. Where F is evolved, which they lack, all but the start are
+        computed again.
         """
         earlier, samples = earlier or [(self.find_start(), None)], None
+        if self.stepper.evolves:
+            earlier = earlier[:1]
         sampler = self.make_sampler(earlier[0][0].xhat)
         for k, (latent, report) in enumerate(earlier):
             if k > 0:
@@ -97,6 +101,8 @@ class RunOptions(NamedTuple):
                                 # over that of one whose is free (see `rom.prescribed`)
     boundary_cells: str = WHOLE     # of Eulerian points, one of `eulerian.BOUNDARY_CELLS`; "cut" is
                                     # ours
+    deformation_gradient: str = ORIGINS[0]      # of material points: of the "map", or "evolved" on
+                                    # the grid (see `rom.evolution`), which is ours
 
     @property
     def name(self):
@@ -135,11 +141,12 @@ def with_numbers(full, g, options):
 def ldm_model(full, g, options):
     """Return LDM's `ReducedStepper` of a `FullModel` on a map g. Raises ValueError for a quadrature
     that does not exist, and as `require_own_points`, `require_boundary_cells`,
-    `require_prescribed_region` and `with_precision` do.
+    `require_prescribed_region`, `require_material_points` and `with_precision` do.
     """
     require_own_points(full, options)
     require_boundary_cells(full, options)
     require_prescribed_region(full, options)
+    require_material_points(options)
     problem = full.problem
     make = {"lagrangian": material_quadrature, "eulerian": cell_quadrature,
             "resampled": resampled_quadrature}
@@ -150,7 +157,8 @@ def ldm_model(full, g, options):
                        make[options.quadrature](full, options), full.law, problem.gravity,
                        options.projection, conditions=problem.conditions,
                        velocity=options.velocity, transfer=transfer,
-                       v0=full.v if len(full.bodies) > 1 else None)
+                       v0=full.v if len(full.bodies) > 1 else None,
+                       deformation_gradient=options.deformation_gradient)
 
 
 def require_own_points(full, options):
@@ -159,6 +167,14 @@ def require_own_points(full, options):
         raise ValueError(f"quadrature = {options.quadrature!r} with {len(full.bodies)} bodies: "
                          f"expected {QUADRATURES[0]!r}, since its other points have one shape, one "
                          "density and one law")
+
+
+def require_material_points(options):
+    """Raise ValueError where F is evolved at quadrature points that do not move with the body."""
+    if options.deformation_gradient == "evolved" and options.quadrature != QUADRATURES[0]:
+        raise ValueError(f"deformation_gradient = 'evolved' with quadrature = "
+                         f"{options.quadrature!r}: expected {QUADRATURES[0]!r}, whose points are "
+                         "material points that can keep F; or deformation_gradient = 'map'")
 
 
 def require_boundary_cells(full, options):

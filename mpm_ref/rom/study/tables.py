@@ -6,6 +6,7 @@ import numpy as np
 from msgspec import Meta, Struct, field, to_builtins
 
 from ...shapes.quantities import Count, Natural, NotNegative, PerCell, Positive, Seed
+from ..evolution import ORIGINS
 from ..fields.architecture import HIDDEN
 from ..fields.pod_fields import Sizes
 from ..latent import VELOCITIES
@@ -160,6 +161,7 @@ class MapRunTable(StudyTable):
     driven_weight: Positive = RunOptions().driven_weight    # largest weight, of a
                                                 # sample whose velocity is prescribed
     boundary_cells: str = RunOptions().boundary_cells  # of Eulerian points
+    deformation_gradient: str = RunOptions().deformation_gradient   # of material points
     velocity: str = RunOptions().velocity
     seed: Seed = 0                              # of the samples
 
@@ -170,6 +172,7 @@ class MapRunTable(StudyTable):
         one_of("velocity", self.velocity, VELOCITIES)
         one_of("precision", self.precision, PRECISIONS)
         one_of("boundary_cells", self.boundary_cells, BOUNDARY_CELLS)
+        one_of("deformation_gradient", self.deformation_gradient, ORIGINS)
 
     @property
     def options(self):
