@@ -23,6 +23,7 @@ VARIANTS = {        # words behind the id of a printed number
     "displacement": "relative to the displacement instead of the distance from the origin",
     "partial": "over fewer runs than the printed number",
     "small": "at another size than the printed number",
+    "evolved": "deformation gradients evolved on the grid in place of the map's",
     "cheap": "with options that the paper does not have, chosen for speed",
 }
 INCOMPLETE = {"partial", "small"}       # such a number gets no credit, as fewer steps err less

@@ -16,17 +16,18 @@ from mpm_ref.rom.study.run import RunOptions, ldm_run
 from .arm_models import CORRECTIONS
 from .live_runs import TICKS, LiveMethod, full_states
 
+SOURCES = {"map": "of the map", "evolved": "evolved"}       # of F, in words
 
-def ldm_method(name, training, r, count=None):
-    """Return the `LiveMethod` of LDM on r modes of a `StepTraining`, with `count` samples, or
-    all.
-    """
+
+def ldm_method(name, training, r, **options):
+    """Return the `LiveMethod` of LDM on r modes of a `StepTraining`; options: of `RunOptions`."""
     clock, X = process_time(), training.X
     g = modes(X, np.concatenate(training.x), np.concatenate(training.F), r)
-    fit, points = process_time() - clock, np.arange(len(X))
-    return LiveMethod(name, partial(reduced_states, training.scene, g, RunOptions(points=count)),
+    fit, points, options = process_time() - clock, np.arange(len(X)), RunOptions(**options)
+    return LiveMethod(name, partial(reduced_states, training.scene, g, options),
                       partial(numbered(g).place, points), fit, training.cpu,
-                      settings=f"r = {r}, {count or 'all'} samples")
+                      settings=f"r = {r}, {options.points or 'all'} samples, F "
+                      f"{SOURCES[options.deformation_gradient]}")
 
 
 def reduced_states(scene, g, options, load):

@@ -65,11 +65,13 @@ def methods(scene, training, gravity):
     coarse = sized(scene, 2.0 * DX)
     made = (full_method(scene), coarse_method(coarse, 2.0, training.X),
             corrected_method(training, step_training(coarse, gravity), 2.0),
-            ldm_method("ldm", training, 6), superposition_method(training))
+            ldm_method("ldm", training, 6),
+            ldm_method("ldm.evolved", training, 6, deformation_gradient="evolved"),
+            superposition_method(training))
     return {one.name: one for one in made}
 
 
-NAMES = ("full.pic", "coarse.2.pic", "corrected.2", "ldm", "superposition")
+NAMES = ("full.pic", "coarse.2.pic", "corrected.2", "ldm", "ldm.evolved", "superposition")
 
 
 def test_training_gravity_is_that_of_the_study(study, gravity):
@@ -150,6 +152,7 @@ def test_methods_follow_a_training_run(methods, training, gravity):
     error = {name: errors(training.X, [played(one, load)], reference)[0]
              for name, one in methods.items()}
     assert error["ldm"] < 0.05
+    assert error["ldm.evolved"] < 0.05
     assert error["corrected.2"] < 0.2 * error["coarse.2.pic"]
     assert error["superposition"] < 0.3
 
@@ -215,7 +218,8 @@ def test_methods_are_compared_with_the_first_on_all_loads():
 def rows_of(**changes):
     """Rows of methods: {name: (error, CPU seconds of a run)}."""
     values = {"full.pic": (0.0, 4.0), "coarse.2.pic": (0.1, 1.0), "corrected.2": (0.03, 1.5),
-              "ldm": (0.04, 3.0), "ldm.few": (0.03, 0.1), "superposition": (0.2, 0.01), **changes}
+              "ldm": (0.04, 3.0), "ldm.few": (0.03, 0.1), "ldm.evolved": (0.02, 6.0),
+              "superposition": (0.2, 0.01), **changes}
     return [ArmCost("400", 9, name, error, error, cpu, 0.0, 0.0, 0.0)
             for name, (error, cpu) in values.items()]
 
@@ -227,6 +231,8 @@ def test_ldm_is_compared_with_the_cheapest_other_of_no_larger_error():
     assert "corrected.2" in run.notes["x.ldm.gain"]
     assert run.values["x.ldm.beats-superposition"] == pytest.approx(5.0)
     assert run.values["x.ldm"] == pytest.approx(4.0)
+    assert run.values["x.ldm.evolved.gain"] == pytest.approx(4.0 / 6.0)
+    assert run.values["x.ldm.evolved.beats-superposition"] == pytest.approx(10.0)
     assert "x.full.pic" not in run.values
 
 

@@ -1,0 +1,134 @@
+"""Deformation gradients that reduced runs evolve on the grid, beside those of the map: ours.
+
+With `deformation_gradient = "evolved"` quadrature points keep F as the full model's particles do
+(`rom.evolution`). The option has no number that could be chosen on tests. Pokes, one (Table 5) and
+ten in a row (Table 6), are judged by the printed errors of Lagrangian quadrature; elsewhere errors
+are set beside those with the map's F.
+"""
+
+from functools import partial
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from mpm_ref.rom.evolution import ORIGINS
+from mpm_ref.rom.study.errors import PositionErrors
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import PROJECTIONS, RunOptions
+from mpm_ref.trajectories import history
+
+from ..common.position_errors import mean_errors
+from ..common.registry import experiment
+from ..common.scenes import threads_for
+from ..common.seeding import generator
+from .networks import POKE_NETS, SEEDS, trained
+from .references import References, pod, record_errors, references
+from .studies import GRAVITY, POKES, TORSION, poked_again
+from .tables import POINTS, POKED, TESTED
+
+NAME = "ldm.evolved"
+MAP, EVOLVED = ORIGINS
+MODES = {"poke": (6, 12, 24), "gravity": (4, 7), "torsion": (7,)}    # of POD, by study
+COLUMNS = ("table", "map", "F", "scheme", "points", "origin", "centroid", "displacement")
+
+
+class Case(NamedTuple):
+    """A map, and the runs on it."""
+
+    name: str               # in records
+    tests: References
+    g: object
+    rest: np.ndarray        # (r,) latent coordinates at rest
+
+
+@experiment(NAME, title="LDM: deformation gradients evolved on the grid",
+            profiles=("standard",), budget={"standard": 2400})
+def evolved_gradients(run):
+    """Record errors of pokes by networks, beside the printed ones, and of all studies by both
+    origins of F.
+    """
+    rows = []
+    for case in compared_cases():
+        rows += compared_rows(run, case)
+    rows += judged_rows(run, "ldm.table6", poked_in_a_row(run))
+    rows += judged_rows(run, "ldm.table5", references(POKES))
+    run.table("errors", COLUMNS, rows)
+
+
+def poked_in_a_row(run):
+    """Return the `References` of ten pokes one after the other, those of `ldm.table6`."""
+    angles = generator(run.seed, "ldm.table6").uniform(0.0, 2.0 * np.pi, POKED)
+    one = ldm_full_model(poked_again(angles))
+    with threads_for(one.problem.bodies):
+        return References(POKES.name, (one,), (history(one.problem).x,), 1)
+
+
+def judged_rows(run, table, tests):
+    """Record the errors of evolved F with the poke's networks in the mean over trainings, by the
+    ids of a printed table, and those of the map's F by linear projection. Return rows of all.
+    """
+    rows, scale = [], f"{tests.scale}, {len(POKE_NETS)} trainings, one draw of samples"
+    plans = [(EVOLVED, one) for one in PROJECTIONS] + [(MAP, PROJECTIONS[1])]
+    for (origin, projection), points in run.progress([*product(plans, (POINTS, None))], table):
+        options = RunOptions("lagrangian", projection, points, deformation_gradient=origin)
+        cases = [Case(net, tests, trained(net).field, trained(net).rest) for net in POKE_NETS]
+        errors = [errors_of(run, table, case, options) for case in cases]
+        mean, note = mean_errors(errors, "trainings")
+        name, note = f"{options.name}.{points or 'all'}", f"{note}; each {each(errors)} %"
+        if origin == EVOLVED:
+            record_errors(run, f"{table}.{name}.{EVOLVED}", mean, scale, note)
+        else:
+            record_errors(run, f"{NAME}.{table}.{name}.{MAP}", mean, scale, note,
+                          comparator="info")
+        rows += [row(table, case, options, one) for case, one in zip(cases, errors, strict=True)]
+    return rows
+
+
+def each(errors):
+    """Return several errors in words, in per cent."""
+    return ", ".join(f"{100.0 * one.origin:.3g}" for one in errors)
+
+
+def compared_cases():
+    """Yield the `Case` of each map on which both origins of F are compared."""
+    for study, nets in ((POKES, ()), (GRAVITY, ("gravity-r7",)),
+                        (TORSION, [f"torsion-{seed}" for seed in range(SEEDS)])):
+        tests = references(study, TESTED if study is POKES else None)
+        for net in nets:
+            yield Case(net, tests, trained(net).field, trained(net).rest)
+        for r in MODES[study.name]:
+            yield Case(f"{study.name}.pod-{r}", tests, pod(study.name, r), np.zeros(r))
+
+
+def compared_rows(run, case):
+    """Record the errors of a `Case` with all points, and with a few, by both origins of F; and the
+    ratio of the errors with all points. Return rows of them.
+    """
+    rows = []
+    for points in (None, POINTS):
+        errors = {}
+        for origin in ORIGINS:
+            options = RunOptions(points=points, deformation_gradient=origin)
+            errors[origin] = errors_of(run, "", case, options)
+            record_errors(run, f"{NAME}.{case.name}.{points or 'all'}.{origin}", errors[origin],
+                          case.tests.scale, comparator="info")
+            rows.append(row("", case, options, errors[origin]))
+        if points is None:
+            run.record(f"{NAME}.{case.name}.ratio", errors[EVOLVED].origin / errors[MAP].origin,
+                       unit="1", scale=case.tests.scale, comparator="<=", bound=1.0,
+                       note="error with evolved F over that with the map's, all points")
+    return rows
+
+
+def errors_of(run, table, case, options):
+    """Return the `PositionErrors` of the runs of a `Case`, which an interrupted run has cached."""
+    key = f"{table}{case.name}.{options.name}.{options.points}.{options.deformation_gradient}"
+    return PositionErrors(*run.cached(key, partial(case.tests.run_errors, case.g, case.rest,
+                                                   options)))
+
+
+def row(table, case, options, errors):
+    """Return a row of the table of all errors."""
+    return (table, case.name, options.deformation_gradient, options.name,
+            options.points or len(case.tests.X), *errors)
