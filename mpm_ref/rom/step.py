@@ -37,6 +37,7 @@ from .quadrature import Quadrature
 from .quadrature.lagrangian import NumberedPoints
 
 GAUSS_NEWTON = PositionInversion()
+MAX_BYTES = 1e9         # of the grid of a reduced step
 BREAKDOWNS = (NoBody, OutOfRange, np.linalg.LinAlgError)    # with which a run may end midway
 
 
@@ -197,11 +198,24 @@ class ReducedStepper:
         alone (LDM-sec3.1-bc).
         """
         bodies = (body, samples) if self.quadrature.feather else (body,)
+        self.require_moderate_grid([one.particles.x for one in bodies], t)
         grid = scatter(bodies, self.storage, self.scheme, dt)
         update(grid, self.gravity, dt)
         if self.conditions is not None:
             self.conditions.apply(grid, t + dt, dt)
         return grid
+
+    def require_moderate_grid(self, clouds, t):
+        """Raise `NoBody` where the grid that points (.., d) need in a step from t [s] is larger
+        than MAX_BYTES: a body that latent coordinates have blown up asks for all memory.
+        """
+        box = self.storage.box(clouds)
+        size = self.storage.bytes(box.shape, box)
+        if size > MAX_BYTES:
+            extent = " x ".join(f"{n * self.storage.dx:.3g}" for n in box.shape)
+            raise NoBody(f"t = {t:.6g} s: the points need a grid of {extent} m with {size:.1e} "
+                         f"bytes, and a reduced run has at most {MAX_BYTES:.0e}; have the latent "
+                         "coordinates left the range that the map was trained with?")
 
     def project(self, latent, samples, trial, dt, weights=None):
         """Return `projection.Projected` from the samples' `Kinematics` and trial particles."""

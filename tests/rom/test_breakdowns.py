@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from mpm_ref.core.grid import OutOfRange
+from mpm_ref.materials import FixedCorotated
+from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.kinematics import NoBody, guesses
+from mpm_ref.rom.latent import start_state
+from mpm_ref.rom.quadrature.lagrangian import lagrangian
+from mpm_ref.rom.step import ldm_stepper
 from mpm_ref.rom.study import record
 from mpm_ref.rom.study.evaluate import (
     NEAREST,
@@ -148,3 +153,16 @@ def test_a_map_that_is_inverted_or_nowhere_at_all_seeds_gives_no_body(far):
 
     with pytest.raises(NoBody, match="all 3 material points asked are inverted"):
         guesses(Bad(), None, X, X)
+
+
+def test_a_body_that_has_blown_up_does_not_ask_for_all_memory():
+    points = np.random.default_rng(0).uniform(size=(20, 2))
+    V0 = np.full(20, 0.05)
+    g = Affine(2)
+    stepper = ldm_stepper(g, lagrangian(points, 800.0 * V0, V0, 0.17, 2), FixedCorotated(3e3, 4e3),
+                          np.zeros(2))
+    xhat = 1700.0 * g.rest
+    assert np.ptp(g.place(points, xhat), axis=0).min() > 1000.0
+    with pytest.raises(NoBody, match="have the latent coordinates left the range"):
+        stepper.step(start_state(xhat), np.arange(20), 0.0, 1e-3)
+    assert stepper.storage._buffer.nbytes < 1e6
