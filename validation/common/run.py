@@ -123,7 +123,7 @@ class Run:
 
     def _verdict(self, draft):
         """Return the verdict on a draft of a record."""
-        nowhere = dict(seconds=0.0, seed=0, command="", commit="", date="", cores=1)
+        nowhere = dict(seconds=0.0, seed=0, command=self._command(), commit="", date="", cores=1)
         return judged(Measurement(**draft, **nowhere), self._setting.targets).verdict
 
     def note(self, text):

@@ -11,9 +11,9 @@ from .verdicts import printed_id
 
 NO_RATIO = "—"      # of a number to a printed one, where either is missing
 STATE_NAMES = {"pass": "reproduced", "better": "better", "miss": "missed",
-               "chosen": "chosen on these runs", "info": "another machine",
-               "other": "another method or body", "absent": "not measured"}
-UNCREDITED = "as printed, without credit"      # of numbers that `verdicts.INCOMPLETE` marks
+               "chosen": "chosen on these runs", "uncredited": "as printed, without credit",
+               "info": "another machine", "other": "another method or body",
+               "absent": "not measured"}
 
 
 class Selected(NamedTuple):
@@ -57,7 +57,7 @@ def verdict_text(one):
 
 def counted(rows):
     """Return the counts of verdicts as text."""
-    found = Counter(STATE_NAMES.get(row.verdict, UNCREDITED) for row in rows)
+    found = Counter(STATE_NAMES[row.verdict] for row in rows)
     return ", ".join(f"{count} {name}" for name, count in found.items())
 
 

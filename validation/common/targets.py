@@ -1,7 +1,7 @@
 """The numbers the five papers print, and how each is judged, read from validation/targets/*.toml.
 
 A file holds `paper = "nsf"`, `targets = [{id = "nsf.table1.bread.error", value = 1.2, ..}, ..]` and
-the three kinds of groups below. Unit "%" keeps the printed percentage, "1" is a pure number, "x" a
+the kinds of groups below. Unit "%" keeps the printed percentage, "1" is a pure number, "x" a
 ratio, "nondim" a quantity of a scene without units.
 
 comparator: what agreement with the number means (`judge` has the intervals).
@@ -19,6 +19,7 @@ confidence: how sure the number is.
 Groups name numbers by patterns of ids, `*` for any text:
     [[tolerance]]  how far a number may be off, and why; each "~" needs one
     [[chosen]]     records whose settings were picked on the runs that are judged: "chosen"
+    [[smaller]]    records of a profile whose scenes are smaller than the printed ones: no credit
     [[cause]]      why numbers are missed, and the experiment that shows it
     [[headline]]   a claim of the paper, with the numbers that stand for it
 """
@@ -69,6 +70,14 @@ class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     why: str
 
 
+class Smaller(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Records of a profile at which scenes are smaller than the printed ones."""
+
+    ids: list[str]
+    why: str
+    profile: str = "standard"
+
+
 class Cause(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Why numbers are missed, with the experiment that shows it, if one does."""
 
@@ -97,6 +106,7 @@ class TargetFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     targets: list[dict]
     tolerance: list[Tolerance] = []
     chosen: list[Choice] = []
+    smaller: list[Smaller] = []
     cause: list[Cause] = []
     headline: list[Headline] = []
 
@@ -108,6 +118,7 @@ class Targets(dict):
         super().__init__(by_id)
         self.tolerances = [group for file in files for group in file.tolerance]
         self.choices = [group for file in files for group in file.chosen]
+        self.smaller = [group for file in files for group in file.smaller]
         self.causes = [group for file in files for group in file.cause]
         self.headlines = {file.paper: file.headline for file in files}
 
@@ -127,6 +138,11 @@ class Targets(dict):
         """Return what was picked on the runs of a record, empty where nothing was."""
         group = first_of(self.choices, record_id)
         return group.why if group else ""
+
+    def is_smaller(self, record):
+        """Return whether a `Measurement` is of scenes that are smaller than the printed ones."""
+        groups = [group for group in self.smaller if record.command.endswith(group.profile)]
+        return first_of(groups, record.target) is not None
 
     def cause(self, record_id):
         """Return the `Cause` of a missed number, or None where it is not known."""

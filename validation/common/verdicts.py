@@ -26,7 +26,8 @@ VARIANTS = {        # words behind the id of a printed number
     "evolved": "deformation gradients evolved on the grid in place of the map's",
     "cheap": "with options that the paper does not have, chosen for speed",
 }
-INCOMPLETE = {"partial", "small"}       # such a number gets no credit, as fewer steps err less
+INCOMPLETE = {"partial", "small"}       # such a number gets no credit, as fewer steps err less; nor
+                                        # one that `targets.Smaller` names
 KINDS = ("result", "setting", "variant", "own", "remark")
 
 
@@ -62,7 +63,7 @@ def judged(record, targets):
     target = targets[base]
     verdict, interval = judge_printed(record.value, targets.criterion(base))
     kind = "variant" if variants else "setting" if target.kind == "setting" else "result"
-    if passes(verdict) and INCOMPLETE & {*variants}:
+    if passes(verdict) and (INCOMPLETE & {*variants} or targets.is_smaller(record)):
         verdict = "uncredited"
     return Judged(kind, chosen(record, targets, verdict), interval, target, variants)
 

@@ -51,8 +51,8 @@ def evolved_gradients(run):
     rows = []
     for case in compared_cases():
         rows += compared_rows(run, case)
-    rows += judged_rows(run, "ldm.table6", poked_in_a_row(run))
-    rows += judged_rows(run, "ldm.table5", references(POKES))
+    rows += judged_rows(run, "ldm.table6", poked_in_a_row(run), POKE_NETS[:1])
+    rows += judged_rows(run, "ldm.table5", references(POKES), POKE_NETS)
     run.table("errors", COLUMNS, rows)
 
 
@@ -64,25 +64,34 @@ def poked_in_a_row(run):
         return References(POKES.name, (one,), (history(one.problem).x,), 1)
 
 
-def judged_rows(run, table, tests):
-    """Record the errors of evolved F with the poke's networks in the mean over trainings, by the
-    ids of a printed table, and those of the map's F by linear projection. Return rows of all.
+def judged_rows(run, table, tests, nets):
+    """Record the errors of evolved F by the ids of a printed table: by linear projection in the
+    mean over the poke's networks `nets`, by nonlinear on the first of them; and those of the map's
+    F by linear projection on the first. Return rows of all.
     """
-    rows, scale = [], f"{tests.scale}, {len(POKE_NETS)} trainings, one draw of samples"
-    plans = [(EVOLVED, one) for one in PROJECTIONS] + [(MAP, PROJECTIONS[1])]
-    for (origin, projection), points in run.progress([*product(plans, (POINTS, None))], table):
+    rows, nonlinear, linear = [], *PROJECTIONS
+    plans = ((EVOLVED, linear, nets), (EVOLVED, nonlinear, nets[:1]), (MAP, linear, nets[:1]))
+    for (origin, projection, chosen), points in run.progress([*product(plans, (None, POINTS))],
+                                                             table):
         options = RunOptions("lagrangian", projection, points, deformation_gradient=origin)
-        cases = [Case(net, tests, trained(net).field, trained(net).rest) for net in POKE_NETS]
+        cases = [Case(net, tests, trained(net).field, trained(net).rest) for net in chosen]
         errors = [errors_of(run, table, case, options) for case in cases]
-        mean, note = mean_errors(errors, "trainings")
-        name, note = f"{options.name}.{points or 'all'}", f"{note}; each {each(errors)} %"
-        if origin == EVOLVED:
-            record_errors(run, f"{table}.{name}.{EVOLVED}", mean, scale, note)
-        else:
-            record_errors(run, f"{NAME}.{table}.{name}.{MAP}", mean, scale, note,
-                          comparator="info")
+        mean, note = mean_errors(errors, "trainings, one draw of samples")
+        about = f"{options.name}.{points or 'all'}", f"{note}; each {each(errors)} %"
+        record_judged(run, table, origin, about, (mean, tests.scale))
         rows += [row(table, case, options, one) for case, one in zip(cases, errors, strict=True)]
     return rows
+
+
+def record_judged(run, table, origin, about, found):
+    """Record errors by the id of a printed number where F is evolved, else by one of our own.
+    about = (name of the scheme, note); found = (errors, scale).
+    """
+    (name, note), (errors, scale) = about, found
+    if origin == EVOLVED:
+        record_errors(run, f"{table}.{name}.{EVOLVED}", errors, scale, note)
+    else:
+        record_errors(run, f"{NAME}.{table}.{name}.{MAP}", errors, scale, note, comparator="info")
 
 
 def each(errors):

@@ -16,7 +16,7 @@ from validation.common.judge import (
 )
 from validation.common.record import Measurement
 from validation.common.results import RESULTS, ProfileResults
-from validation.common.targets import Choice, Target, TargetFile, Targets, Tolerance, load
+from validation.common.targets import Choice, Smaller, Target, TargetFile, Targets, Tolerance, load
 from validation.common.verdicts import VARIANTS, judged, printed_counts, printed_id
 
 NOT_FINITE = (None, math.nan, math.inf, -math.inf)
@@ -173,7 +173,8 @@ NUMBERS = [printed("toy.error", "<="), printed("toy.count", "~"), printed("toy.t
            printed("toy.printed.step", "=")]
 TARGETS = Targets({t.id: t for t in NUMBERS}, [TargetFile(
     "toy", [], tolerance=[Tolerance(["toy.count"], "why", factor=2.0)],
-    chosen=[Choice(["toy.picked", "toy.error.modes", "trade.picked"], "on the test")])])
+    chosen=[Choice(["toy.picked", "toy.error.modes", "trade.picked"], "on the test")],
+    smaller=[Smaller(["toy.*"], "an eighth of the points")])])
 
 
 def measured(id, value, comparator="printed", **fields):
@@ -209,6 +210,14 @@ def test_a_record_is_judged_by_todays_rules(record, kind, verdict):
     """Whatever rule an experiment stored for a printed number."""
     one = judged(record, TARGETS)
     assert (one.kind, one.verdict) == (kind, verdict)
+
+
+@pytest.mark.parametrize(("profile", "verdict"), [("standard", "uncredited"), ("paper", "better")])
+def test_a_number_of_smaller_scenes_gets_no_credit_at_their_profile(profile, verdict):
+    command = f"python -m validation run toy --profile {profile}"
+    record = msgspec.structs.replace(measured("toy.error", 0.5), command=command)
+    assert judged(record, TARGETS).verdict == verdict
+    assert judged(msgspec.structs.replace(record, value=9.0), TARGETS).verdict == "miss"
 
 
 def test_a_changed_rule_changes_the_verdict_of_a_stored_record():
