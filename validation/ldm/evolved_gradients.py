@@ -18,11 +18,10 @@ from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.run import PROJECTIONS, RunOptions
 from mpm_ref.trajectories import history
 
-from ..common.position_errors import mean_errors
 from ..common.registry import experiment
 from ..common.scenes import threads_for
 from ..common.seeding import generator
-from .networks import POKE_NETS, SEEDS, trained
+from .networks import SEEDS, trained
 from .references import References, pod, record_errors, references
 from .studies import GRAVITY, POKES, TORSION, poked_again
 from .tables import POINTS, POKED, TESTED
@@ -30,6 +29,7 @@ from .tables import POINTS, POKED, TESTED
 NAME = "ldm.evolved"
 MAP, EVOLVED = ORIGINS
 MODES = {"poke": (6, 12, 24), "gravity": (4, 7), "torsion": (7,)}    # of POD, by study
+NOTE = "one training, one draw of samples"
 COLUMNS = ("table", "map", "F", "scheme", "points", "origin", "centroid", "displacement")
 
 
@@ -51,8 +51,8 @@ def evolved_gradients(run):
     rows = []
     for case in compared_cases():
         rows += compared_rows(run, case)
-    rows += judged_rows(run, "ldm.table6", poked_in_a_row(run), POKE_NETS[:1])
-    rows += judged_rows(run, "ldm.table5", references(POKES), POKE_NETS)
+    rows += judged_rows(run, "ldm.table6", poked_in_a_row(run))
+    rows += judged_rows(run, "ldm.table5", references(POKES))
     run.table("errors", COLUMNS, rows)
 
 
@@ -64,39 +64,24 @@ def poked_in_a_row(run):
         return References(POKES.name, (one,), (history(one.problem).x,), 1)
 
 
-def judged_rows(run, table, tests, nets):
-    """Record the errors of evolved F by the ids of a printed table: by linear projection in the
-    mean over the poke's networks `nets`, by nonlinear on the first of them; and those of the map's
-    F by linear projection on the first. Return rows of all.
+def judged_rows(run, table, tests):
+    """Record the errors of evolved F on the poke's network by the ids of a printed table, and
+    beside them those of the map's F by linear projection. Return rows of all.
     """
-    rows, nonlinear, linear = [], *PROJECTIONS
-    plans = ((EVOLVED, linear, nets), (EVOLVED, nonlinear, nets[:1]), (MAP, linear, nets[:1]))
-    for (origin, projection, chosen), points in run.progress([*product(plans, (None, POINTS))],
-                                                             table):
+    rows, model = [], trained(POKES.name)
+    case = Case(POKES.name, tests, model.field, model.rest)
+    plans = [(EVOLVED, one) for one in PROJECTIONS] + [(MAP, PROJECTIONS[1])]
+    for (origin, projection), points in run.progress([*product(plans, (None, POINTS))], table):
         options = RunOptions("lagrangian", projection, points, deformation_gradient=origin)
-        cases = [Case(net, tests, trained(net).field, trained(net).rest) for net in chosen]
-        errors = [errors_of(run, table, case, options) for case in cases]
-        mean, note = mean_errors(errors, "trainings, one draw of samples")
-        about = f"{options.name}.{points or 'all'}", f"{note}; each {each(errors)} %"
-        record_judged(run, table, origin, about, (mean, tests.scale))
-        rows += [row(table, case, options, one) for case, one in zip(cases, errors, strict=True)]
+        errors = errors_of(run, table, case, options)
+        name = f"{options.name}.{points or 'all'}"
+        if origin == EVOLVED:
+            record_errors(run, f"{table}.{name}.{EVOLVED}", errors, tests.scale, NOTE)
+        else:
+            record_errors(run, f"{NAME}.{table}.{name}.{MAP}", errors, tests.scale, NOTE,
+                          comparator="info")
+        rows.append(row(table, case, options, errors))
     return rows
-
-
-def record_judged(run, table, origin, about, found):
-    """Record errors by the id of a printed number where F is evolved, else by one of our own.
-    about = (name of the scheme, note); found = (errors, scale).
-    """
-    (name, note), (errors, scale) = about, found
-    if origin == EVOLVED:
-        record_errors(run, f"{table}.{name}.{EVOLVED}", errors, scale, note)
-    else:
-        record_errors(run, f"{NAME}.{table}.{name}.{MAP}", errors, scale, note, comparator="info")
-
-
-def each(errors):
-    """Return several errors in words, in per cent."""
-    return ", ".join(f"{100.0 * one.origin:.3g}" for one in errors)
 
 
 def compared_cases():
