@@ -1,5 +1,4 @@
-"""Pokes with evolved deformation gradients over several trainings of the map: `ldm.evolved` has one.
-"""
+"""Pokes with evolved F over several trainings of the map; `ldm.evolved` has one training."""
 
 import numpy as np
 

@@ -14,11 +14,12 @@ from mpm_ref.core.jit import set_threads
 
 from ..common.registry import experiment
 from .arm_models import FEW
-from .live_models import corrected_method, ldm_method, superposition_method
+from .live_models import corrected_method, ldm_method, operators_method, superposition_method
 from .live_runs import (
     coarse_method,
     drawn_loads,
     full_method,
+    load_training,
     played,
     points_of,
     sized,
@@ -31,6 +32,10 @@ from .reduced import COLUMNS, ArmCost, errors
 COARSER = (1.5, 2.0, 4.0)       # times as coarse
 CORRECTED = (2.0, 4.0)          # ... of the runs that are corrected
 MORE = 30                       # modes of LDM with evolved F
+R_OPERATORS = 6                 # modes of inferred operators,
+LEARNED, LEARNED_SEED = 32, 8   # their training runs, and the seed of these loads
+REPEATED = 1000                 # runs after which their cost is judged,
+GAIN, WITHIN = 5.0, 0.01        # what they have to gain then, and with which error
 SEED = 1                        # of the loads; settings were chosen on those of seed 0
 
 
@@ -47,7 +52,7 @@ BODIES = QUICK | {"400-apic": LiveBody(0.04, 6, "apic"), "13k": LiveBody(0.0125,
 
 
 @experiment("trade.reduced-live", title="Reduced models under loads known while the run goes on",
-            profiles=("quick", "standard"), budget={"quick": 8, "standard": 400})
+            profiles=("quick", "standard"), budget={"quick": 15, "standard": 700})
 def reduced_live(run):
     """Measure every method at each size; record whether LDM pays."""
     threads = numba.get_num_threads()
@@ -96,6 +101,8 @@ def methods(scenes, gravity, modes):
                                 ("ldm.evolved.modes", MORE, None)):
         yield ldm_method(name, training, count, points=points, deformation_gradient="evolved")
     yield superposition_method(training)
+    loads = drawn_loads(gravity, LEARNED, LEARNED_SEED)
+    yield operators_method(load_training(scene, loads), R_OPERATORS)
 
 
 def by_mls(scene):
@@ -126,11 +133,35 @@ def record_body(run, name, rows, scale):
                    f"a run takes {row.cpu_run:.3g} CPU s, {full.method} {full.cpu_run:.3g}; before "
                    f"the first run {row.first:.3g}{'; ' + row.settings if row.settings else ''}")
     one = {row.method: row for row in rows}
+    record_operators(run, name, rows, scale)
     for method in ("ldm", "ldm.evolved"):
         record_gain(run, name, (rows, method), scale)
         run.record(f"{name}.{method}.beats-superposition",
                    one["superposition"].error / one[method].error, unit="x", comparator=">=",
                    bound=1.0, scale=scale, note="error of superposed responses over that of LDM")
+
+
+def record_operators(run, name, rows, scale):
+    """Record the error of inferred operators by the bound WITHIN; how many times as much CPU time
+    as they the cheapest other method with at most their error takes for REPEATED runs, with all
+    that it needs before the first one; and after how many runs they are the cheapest.
+    """
+    own = next(row for row in rows if row.method == "operators")
+    others = [row for row in rows if row is not own and row.error <= own.error]
+    best = min(others, key=lambda row: row.first + REPEATED * row.cpu_run)
+    total = [row.first + REPEATED * row.cpu_run for row in (best, own)]
+    sound = np.isfinite(own.error)
+    run.record(f"{name}.operators.within", 100.0 * own.error, unit="%", comparator="<=",
+               bound=100.0 * WITHIN, scale=scale, note="of the displacement")
+    run.record(f"{name}.operators.gain", total[0] / total[1] if sound else 0.0, unit="x",
+               comparator=">=", bound=GAIN, scale=scale,
+               note=f"CPU time of {REPEATED} runs with training, of {best.method}, the cheapest "
+               f"with at most their error, {100.0 * own.error:.3g} %, over that of operators")
+    pays = max((own.first - row.first) / (row.cpu_run - own.cpu_run)
+               if row.cpu_run > own.cpu_run else np.inf for row in others)
+    run.record(f"{name}.operators.pays", pays if sound else np.inf, unit="runs",
+               comparator="info", scale=scale, note="from which operators are the cheapest method "
+               "of at most their error, training included")
 
 
 def record_gain(run, name, found, scale):

@@ -1,5 +1,6 @@
-"""Models computed from training runs under constant gravity, for runs under one that changes: LDM's
-modes, responses to steps that are superposed, and a correction of coarse runs.
+"""Models computed from training runs, for runs under a gravity that changes: LDM's modes, responses
+to steps that are superposed, and a correction of coarse runs, of runs under constant gravity;
+operators that are inferred, of runs under random loads.
 """
 
 from functools import partial
@@ -9,7 +10,8 @@ import numpy as np
 
 from mpm_ref.rom.correction import carrier, fit_correction
 from mpm_ref.rom.fields.numbered import numbered
-from mpm_ref.rom.fields.pod import modes
+from mpm_ref.rom.fields.pod import directions, modes
+from mpm_ref.rom.inference import fit_dynamics
 from mpm_ref.rom.study.full_model import field_of, ldm_full_model
 from mpm_ref.rom.study.run import RunOptions, ldm_run
 
@@ -94,3 +96,25 @@ def corrected_method(training, coarse, times):
     return LiveMethod(f"corrected.{times:g}", partial(full_states, coarse.scene),
                       lambda bodies: fit.place(field_of(bodies, "x")), process_time() - clock,
                       training.cpu, coarse.cpu, f"smoothing {fit.smoothing:g}")
+
+
+def operators_method(training, r):
+    """Return the `LiveMethod` of operator inference on r modes of a `LoadTraining`."""
+    clock, (runs, levels, *shape) = process_time(), training.x.shape
+    U, a = directions(training.X, training.x.reshape(-1, *shape), r)
+    model = fit_dynamics(a.reshape(runs, levels, r),
+                         np.repeat(training.loads, training.parts, axis=1))
+    return LiveMethod("operators", partial(inferred_states, model, training.parts),
+                      lambda a: training.X + U @ a, process_time() - clock, training.cpu,
+                      settings=f"r = {r}, {runs} training runs under random loads, smoothing "
+                      f"{model.smoothing:g}")
+
+
+def inferred_states(model, parts, load):
+    """Yield the latent coordinates of `LatentDynamics` after each tick of a load; parts: intervals
+    of a tick.
+    """
+    loads = (gravity for gravity in load for _ in range(parts))
+    for k, a in enumerate(model.states(loads), 1):
+        if k % parts == 0:
+            yield a

@@ -26,6 +26,7 @@ from .arm_models import TimedPositions
 
 STUDY = SCENES.parent / "studies" / "sway.toml"
 TICKS = 18              # of a run
+PARTS = 3               # of a tick, at least, after which `LoadTraining` has states
 LEVELS = 9              # after as many ticks each, at which states are compared
 HOLD = (2, 6)           # ticks for which gravity stays: from the first on, below the second
 
@@ -51,6 +52,20 @@ class StepTraining(NamedTuple):
     x: np.ndarray           # (runs, TICKS, n, 3) [m]
     F: np.ndarray           # (runs, TICKS, n, 3, 3)
     cpu: float              # CPU seconds of their steps
+
+
+class LoadTraining(NamedTuple):
+    """Training runs from rest under loads, with states after each of some parts of a tick."""
+
+    loads: np.ndarray       # (runs, TICKS, 3) [m/s^2]
+    X: np.ndarray           # (n, 3) points at rest [m]
+    x: np.ndarray           # (runs, parts * TICKS, n, 3) [m]
+    cpu: float              # CPU seconds of their steps
+
+    @property
+    def parts(self):
+        """Number of the parts of a tick."""
+        return self.x.shape[1] // TICKS
 
 
 def sway():
@@ -108,22 +123,25 @@ def played(method, load):
         return TimedPositions(np.array(x), process_time() - clock)
 
 
-def full_states(scene, load):
-    """Return the iterator over the bodies of a full-order run of a scene after each tick."""
+def full_states(scene, load, parts=1):
+    """Return the iterator over the bodies of a full-order run of a scene after each tick, or after
+    each of some parts of a tick.
+    """
     problem = build(scene)
     stepper = problem.stepper()
     state = start(problem, stepper)
     state.account = None        # of the energy, to which changes of gravity add
-    return full_steps(problem, stepper, state, load)
+    return full_steps(problem, stepper, state, load, parts)
 
 
-def full_steps(problem, stepper, state, load):
-    """Yield the bodies of a `State` after each tick of a load."""
+def full_steps(problem, stepper, state, load, parts=1):
+    """Yield the bodies of a `State` after each of some parts of each tick of a load."""
     for gravity in load:
         stepper.gravity = gravity
-        for _ in range(problem.clock.steps // TICKS):
-            advance(problem, stepper, state)
-        yield state.bodies
+        for _ in range(parts):
+            for _ in range(problem.clock.steps // TICKS // parts):
+                advance(problem, stepper, state)
+            yield state.bodies
 
 
 def full_method(scene):
@@ -155,3 +173,16 @@ def step_training(scene, gravity):
     shape = len(gravity), TICKS
     x, F = (np.reshape(a, (*shape, *a[0].shape)) for a in (x, F))
     return StepTraining(scene, gravity, points_of(scene), x, F, cpu)
+
+
+def load_training(scene, loads):
+    """Return the `LoadTraining` of runs of a scene under loads (runs, TICKS, 3) [m/s^2], with the
+    fewest parts of a tick that are at least PARTS and divide its steps.
+    """
+    steps, x, cpu = scene.steps // TICKS, [], 0.0
+    parts = next(n for n in range(PARTS, steps + 1) if steps % n == 0)
+    for load in loads:
+        clock, states = process_time(), full_states(scene, load, parts)
+        x.append([field_of(bodies, "x") for bodies in states])
+        cpu += process_time() - clock
+    return LoadTraining(loads, points_of(scene), np.array(x), cpu)

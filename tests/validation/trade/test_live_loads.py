@@ -10,11 +10,12 @@ from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 from validation.common.scenes import with_
 from validation.trade.arm_models import TimedPositions
-from validation.trade.live_loads import measured, record_body
+from validation.trade.live_loads import REPEATED, measured, record_body
 from validation.trade.live_models import (
     corrected_method,
     jumps,
     ldm_method,
+    operators_method,
     superposition_method,
 )
 from validation.trade.live_runs import (
@@ -27,6 +28,7 @@ from validation.trade.live_runs import (
     drawn_loads,
     full_method,
     full_states,
+    load_training,
     played,
     points_of,
     sized,
@@ -67,11 +69,13 @@ def methods(scene, training, gravity):
             corrected_method(training, step_training(coarse, gravity), 2.0),
             ldm_method("ldm", training, 6),
             ldm_method("ldm.evolved", training, 6, deformation_gradient="evolved"),
-            superposition_method(training))
+            superposition_method(training),
+            operators_method(load_training(scene, drawn_loads(gravity, 12, 3)), 4))
     return {one.name: one for one in made}
 
 
-NAMES = ("full.pic", "coarse.2.pic", "corrected.2", "ldm", "ldm.evolved", "superposition")
+NAMES = ("full.pic", "coarse.2.pic", "corrected.2", "ldm", "ldm.evolved", "superposition",
+         "operators")
 
 
 def test_training_gravity_is_that_of_the_study(study, gravity):
@@ -155,6 +159,7 @@ def test_methods_follow_a_training_run(methods, training, gravity):
     assert error["ldm.evolved"] < 0.05
     assert error["corrected.2"] < 0.2 * error["coarse.2.pic"]
     assert error["superposition"] < 0.3
+    assert error["operators"] < 0.2
 
 
 def test_points_of_a_coarse_run_without_gravity_stay(methods, training):
@@ -175,6 +180,15 @@ def test_responses_to_jumps_are_added():
     expected = X + 1.5 * S[0, 5] - 0.5 * S[1, 2]
     assert np.allclose(method.place(states[6]), expected)
     assert method.data == 1.0
+
+
+def test_states_of_training_under_loads_are_those_of_the_run(scene, gravity):
+    load = drawn_loads(gravity, 1, 3)
+    training = load_training(scene, load)
+    assert training.parts == 4          # 3 do not divide a tick's steps
+    assert training.x.shape == (1, 4 * TICKS, len(training.X), 3)
+    assert np.array_equal(training.x[0, 7::8],
+                          played(full_method(scene), load[0]).x)
 
 
 def test_jumps_have_ages():
@@ -219,7 +233,7 @@ def rows_of(**changes):
     """Rows of methods: {name: (error, CPU seconds of a run)}."""
     values = {"full.pic": (0.0, 4.0), "coarse.2.pic": (0.1, 1.0), "corrected.2": (0.03, 1.5),
               "ldm": (0.04, 3.0), "ldm.few": (0.03, 0.1), "ldm.evolved": (0.02, 6.0),
-              "superposition": (0.2, 0.01), **changes}
+              "superposition": (0.2, 0.01), "operators": (0.05, 0.01), **changes}
     return [ArmCost("400", 9, name, error, error, cpu, 0.0, 0.0, 0.0)
             for name, (error, cpu) in values.items()]
 
@@ -251,3 +265,15 @@ def test_a_method_that_breaks_down_has_no_positions():
     assert played(LiveMethod("x", states, lambda one: one), np.ones((TICKS, 3))).x is None
     assert isinstance(played(LiveMethod("x", iter, lambda one: one), np.ones((TICKS, 3))),
                       TimedPositions)
+
+
+def test_operators_are_compared_over_many_runs_with_their_training():
+    run, rows = Records(), rows_of()
+    rows = [row._replace(cpu_fit=30.0) if row.method == "operators" else row for row in rows]
+    record_body(run, "x", rows, "")
+    own = 30.0 + REPEATED * 0.01
+    assert run.values["x.operators.gain"] == pytest.approx(REPEATED * 0.1 / own)
+    assert "ldm.few" in run.notes["x.operators.gain"]
+    assert run.values["x.operators.pays"] == pytest.approx(30.0 / (0.1 - 0.01))
+    record_body(run, "x", rows_of(operators=(np.inf, 0.01)), "")
+    assert run.values["x.operators.gain"] == 0.0

@@ -1,0 +1,93 @@
+"""Operator inference finds the dynamics that data come from, and refuses what is no data."""
+
+import re
+
+import numpy as np
+import pytest
+
+from mpm_ref.rom import inference
+from mpm_ref.rom.inference import LatentDynamics, features_of, fit_dynamics, regression
+from mpm_ref.rom.kinematics import NoBody
+
+RUNS, INTERVALS, R, M = 10, 40, 3, 2
+
+
+def true_dynamics():
+    """Damped oscillators with a weak quadratic coupling."""
+    rng = np.random.default_rng(0)
+    K = -np.diag([0.1, 0.2, 0.4])
+    D, B = -0.3 * np.eye(R), rng.normal(size=(M, R))
+    H = 0.01 * rng.normal(size=(R * (R + 1) // 2, R))
+    return LatentDynamics(np.vstack([K, D, B, H]), 0.0)
+
+
+def loads(seed, runs=RUNS):
+    """Loads that jump now and then."""
+    return np.repeat(np.random.default_rng(seed).uniform(-0.3, 0.3, (runs, 8, M)), 5, axis=1)
+
+
+def runs_of(model, u):
+    return np.array([[*model.states(own)] for own in u])
+
+
+def test_a_quadratic_system_is_found_from_its_runs():
+    true, u = true_dynamics(), loads(1)
+    a = runs_of(true, u)
+    assert np.isfinite(a).all()
+    found = LatentDynamics(regression(a, u, 1e-14), 1e-14)
+    assert abs(found.operators - true.operators).max() < 1e-6
+    fresh = loads(2, 3)
+    expected = runs_of(true, fresh)
+    assert abs(runs_of(fit_dynamics(a, u), fresh) - expected).max() < 1e-6 * abs(expected).max()
+
+
+def test_a_state_reads_no_load_before_its_interval():
+    read = []
+
+    def given():
+        for k, u in enumerate(loads(3, 1)[0]):
+            read.append(k)
+            yield u
+
+    for k, _ in enumerate(true_dynamics().states(given())):
+        assert read == [*range(k + 1)]
+
+
+def test_features_are_of_second_order():
+    a, before, u = np.array([2.0, 3.0]), np.array([1.0, 5.0]), np.array([7.0])
+    assert features_of(a, before, u).tolist() == [2.0, 3.0, 1.0, -2.0, 7.0, 4.0, 6.0, 9.0]
+
+
+def test_noise_asks_for_more_smoothing():
+    true, u = true_dynamics(), loads(4, 4)
+    a = runs_of(true, u)
+    noisy = a + 0.05 * abs(a).max() * np.random.default_rng(5).normal(size=a.shape)
+    assert fit_dynamics(noisy, u).smoothing > fit_dynamics(a, u).smoothing
+
+
+def test_a_run_that_explodes_is_stopped_with_a_sentence():
+    model = LatentDynamics(np.vstack([9.0 * np.eye(R), np.zeros((R + M + 6, R))]), 0.0)
+    model.operators[R + R] = 1.0
+    with pytest.raises(NoBody, match="is the load beyond those of the training runs"):
+        [*model.states(np.ones((2000, M)))]
+
+
+@pytest.mark.parametrize(("change", "sentence"), [
+    (lambda a, u: (a[0], u), "expected (runs, intervals, r)"),
+    (lambda a, u: (a, u[:, 1:]), "expected (runs, intervals, r)"),
+    (lambda a, u: (a * np.nan, u), "leave out runs that broke down"),
+    (lambda a, u: (0.0 * a, u), "expected runs that move"),
+    (lambda a, u: (a[:1], u[:1]), "one training run: expected at least two"),
+    (lambda a, u: (a, u, -1.0), "smoothing = -1.0: expected a positive number")])
+def test_what_is_no_data_is_refused(change, sentence):
+    u = loads(1)
+    with pytest.raises(ValueError, match=re.escape(sentence)):
+        fit_dynamics(*change(runs_of(true_dynamics(), u), u))
+
+
+def test_runs_that_break_down_with_all_smoothings_are_refused(monkeypatch):
+    u = loads(1)
+    a = runs_of(true_dynamics(), u)
+    monkeypatch.setattr(inference, "left_out", lambda *given: np.inf)
+    with pytest.raises(ValueError, match="expected more runs, or fewer latent coordinates"):
+        fit_dynamics(a, u)
