@@ -1,19 +1,20 @@
 """Deformation gradients that a reduced run of LDM evolves, in place of those of its map: ours.
 
 LDM takes F from the map in every step (LDM-eq15); the full model evolves it by the grid's velocity
-gradient (LDM-alg1). The force of a point on the grid is the adjoint of that gradient, so that a
-step which evolves F loses as much energy of motion as the stress gains. F of the map is the mean
-of many runs at many places in the cells: beside the same force it may add energy in every step, and
-where the deformation is not among the map's, as in the dent below a grip, its stress is another.
+gradient (LDM-alg1). On the grid, the work of the stress then equals the growth of strain energy, to
+first order in dt. The map's F is fitted to many states, in which points lay elsewhere in their
+cells: its rate is not the grid's gradient, so that a step may add energy of motion. And where the
+map lacks a deformation, as that of the dent below a grip, it lacks its stress.
 
-A point keeps F while it is a quadrature point. One that enters takes the F of the map.
+A point keeps F while it is a quadrature point. One that enters takes the F of the map. F follows
+the velocities of the grid, before the projection: what the map cannot move still strains the body.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-ORIGINS = ("map", "evolved")
+GRADIENTS = MAP, EVOLVED = "map", "evolved"
 
 
 class EvolvedGradients(NamedTuple):

@@ -5,9 +5,9 @@
 a_k are the coordinates of a body on modes (`pod.directions`) after k intervals of equal length, u_k
 the load in the interval that begins then, such as gravity, and a x a the products of two
 coordinates. The operators K, D, B and H follow from training runs by regularised least squares;
-grid, particles and law are not needed, so that a step takes microseconds, and nothing holds a run
-to what is physical. A rival of the papers' methods: the loads of training must be like those of
-use. Squares are all that geometry adds to linear elasticity at second order.
+grid, particles and law are not needed, so that a step is a small product of matrices, and nothing
+holds a run to what is physical. It is a rival of the papers' methods, and its training loads must
+be like those of use.
 """
 
 from typing import NamedTuple
@@ -37,10 +37,10 @@ class LatentDynamics(NamedTuple):
         """Yield the coordinates a (r,) after each interval, from rest; loads: iterator over the
         load (m,) of each interval. Raises `kinematics.NoBody` where they are not finite.
         """
-        a = before = np.zeros(self.r)
+        a, before, pairs = np.zeros(self.r), np.zeros(self.r), np.triu_indices(self.r)
         for k, u in enumerate(loads):
             with np.errstate(over="ignore", invalid="ignore"):
-                change = features_of(a, before, np.asarray(u, dtype=float)) @ self.operators
+                change = features_of(a, before, np.asarray(u, dtype=float), pairs) @ self.operators
                 a, before = 2.0 * a - before + change, a
             if not np.isfinite(a).all():
                 raise NoBody(f"interval {k}: learned coordinates are not finite; is the load "
@@ -48,11 +48,12 @@ class LatentDynamics(NamedTuple):
             yield a
 
 
-def features_of(a, before, u):
+def features_of(a, before, u, pairs):
     """Return the features (.., f) of coordinates a and those an interval before (.., r), and of
-    loads u (.., m), on which the operators act.
+    loads u (.., m), on which the operators act. pairs: two arrays of numbers of coordinates, whose
+    products are the last features.
     """
-    i, j = np.triu_indices(a.shape[-1])
+    i, j = pairs
     return np.concatenate([a, a - before, u, a[..., i] * a[..., j]], axis=-1)
 
 
@@ -61,8 +62,9 @@ def fit_dynamics(a, u, smoothing=None):
     of K intervals, and the loads u (runs, K, m) in them. smoothing: lam over the mean square of a
     scaled feature; None: by `choose_smoothing`.
 
-    Raises ValueError for runs without motion, that are no pairs or not finite, a smoothing that is
-    not positive, and as `choose_smoothing` does.
+    Raises ValueError for arrays whose runs or intervals differ, fewer than two intervals, numbers
+    that are not finite, runs without motion, a smoothing that is not positive or too small, and as
+    `choose_smoothing` does.
     """
     require_runs(a, u, smoothing)
     if smoothing is None:
@@ -72,11 +74,11 @@ def fit_dynamics(a, u, smoothing=None):
 
 def regression(a, u, smoothing):
     """Return the operators (f, r) of the least squares with a smoothing; each feature is scaled to
-    a root mean square of 1.
+    a root mean square of 1. Raises ValueError for a smoothing that is too small.
     """
     rest = np.zeros_like(a[:, :1])
     before, now = (np.concatenate([rest] * n + [a[:, :-n]], axis=1) for n in (2, 1))
-    features = features_of(now, before, u)
+    features = features_of(now, before, u, np.triu_indices(a.shape[2]))
     F = features.reshape(-1, features.shape[-1])
     size = np.sqrt(np.mean(F**2, axis=0))
     size[size == 0.0] = 1.0
@@ -84,7 +86,12 @@ def regression(a, u, smoothing):
     with one_thread():
         A = F / size
         M = A.T @ A + smoothing * len(F) * np.eye(len(size))
-        return cho_solve(cho_factor(M), A.T @ y) / size[:, None]
+        try:
+            return cho_solve(cho_factor(M), A.T @ y) / size[:, None]
+        except np.linalg.LinAlgError:
+            raise ValueError(f"smoothing = {smoothing:g} is too small for features that depend on "
+                             "each other, such as loads that keep one direction: expected more, "
+                             "such as 1e-6") from None
 
 
 def choose_smoothing(a, u):
@@ -120,6 +127,8 @@ def require_runs(a, u, smoothing):
     if a.ndim != 3 or u.ndim != 3 or a.shape[:2] != u.shape[:2]:
         raise ValueError(f"a {a.shape} and u {u.shape}: expected (runs, intervals, r) and (runs, "
                          "intervals, m)")
+    if a.shape[1] < 2:
+        raise ValueError("runs of one interval: expected at least two, for second differences")
     if not (np.isfinite(a).all() and np.isfinite(u).all()):
         raise ValueError("coordinates or loads that are not finite: leave out runs that broke down")
     if not a.any():

@@ -27,7 +27,7 @@ from ..core.grid import OutOfRange, Storage, update
 from ..core.heap import keep_freed_memory
 from ..explicit import Scheme, gather, scatter
 from ..materials import NoFlow
-from .evolution import ORIGINS, EvolvedGradients, evolved
+from .evolution import EVOLVED, GRADIENTS, MAP, EvolvedGradients, evolved
 from .fields import ReducedField
 from .fields.elastic import ElasticMap
 from .kinematics import NoBody
@@ -37,7 +37,8 @@ from .quadrature import Quadrature
 from .quadrature.lagrangian import NumberedPoints
 
 GAUSS_NEWTON = PositionInversion()
-MAX_BYTES = 1e9         # of the grid of a reduced step
+GRID_BYTES = 1e9        # that the grid of a step may always have, and
+GRID_GROWTH = 8.0       # its size over that of the first step, if that is more
 BREAKDOWNS = (NoBody, OutOfRange, np.linalg.LinAlgError)    # with which a run may end midway
 
 
@@ -68,8 +69,9 @@ class ReducedStepper:
 
     The spacing of the grid and the degree of its splines are the quadrature's. velocity is one of
     `latent.VELOCITIES`; v0 the velocities of numbered points that "previous" and "difference" take
-    at the start. dt may differ from that of the data (NSF-sec5.1). Raises ValueError for a velocity
-    that does not exist and a gravity of another dimension.
+    at the start. dt may differ from that of the data (NSF-sec5.1). Raises ValueError for a
+    velocity, transfer or deformation gradient that does not exist or does not suit the others, and
+    a gravity of another dimension.
     """
 
     field: ReducedField
@@ -81,7 +83,7 @@ class ReducedStepper:
                                 # with rates the gradient of its velocity
     velocity: str = "previous"
     v0: np.ndarray | None = None
-    deformation_gradient: str = "map"   # or "evolved", where the quadrature points are material
+    deformation_gradient: str = MAP     # or "evolved", where the quadrature points are material
                                         # points: see `evolution`
 
     def __post_init__(self):
@@ -98,15 +100,20 @@ class ReducedStepper:
         if self.has_gradient and self.velocity != "previous":
             raise ValueError(f"velocity = {self.velocity!r} with transfer {self.transfer!r}: "
                              "expected 'previous', whose gradient is known")
-        if self.deformation_gradient not in ORIGINS:
+        if self.deformation_gradient not in GRADIENTS:
             raise ValueError(f"deformation_gradient = {self.deformation_gradient!r}: expected one "
-                             "of " + ", ".join(ORIGINS))
-        if self.evolves and (self.quadrature.feather or not self.has_rates):
+                             "of " + ", ".join(GRADIENTS))
+        if self.evolves and not self.has_rates:
+            raise ValueError("deformation_gradient = 'evolved' without rates: expected a "
+                             "projection of rates, as LDM has it; NSF's stress is a field and "
+                             "needs no F")
+        if self.evolves and self.quadrature.feather:
             raise ValueError("deformation_gradient = 'evolved': expected 'map', since the points "
-                             "of this quadrature keep no F")
+                             "of this quadrature change from step to step and keep no F")
         keep_freed_memory()
         self.scheme = Scheme(self.quadrature.degree, self.transfer)
         self.storage = Storage(self.quadrature.dx, self.scheme.stencil, d)
+        self.most_bytes = None      # of a grid; see `require_moderate_grid`
 
     @property
     def has_rates(self):
@@ -116,7 +123,7 @@ class ReducedStepper:
     @property
     def evolves(self):
         """Return whether deformation gradients are evolved, and not the map's."""
-        return self.deformation_gradient != ORIGINS[0]
+        return self.deformation_gradient == EVOLVED
 
     @property
     def has_gradient(self):
@@ -148,7 +155,7 @@ class ReducedStepper:
         xhat, vhat, fit = self.project(latent, cloud.samples, trial, dt, weights)
         report = StepReport(len(samples), cloud.report["points"], fit.rank, fit.residual,
                         fit.iterations, fit.converged, cloud.report)
-        gradients = next_gradients(cloud, body.particles.L, dt) if self.evolves else None
+        gradients = next_gradients(cloud, body.particles.L, t, dt) if self.evolves else None
         return latent.advance(xhat, vhat, gradients), report
 
     def cloud(self, latent, samples):
@@ -207,14 +214,17 @@ class ReducedStepper:
 
     def require_moderate_grid(self, clouds, t):
         """Raise `NoBody` where the grid that points (.., d) need in a step from t [s] is larger
-        than MAX_BYTES: a body that latent coordinates have blown up asks for all memory.
+        than GRID_BYTES and GRID_GROWTH times the first one: a body that latent coordinates have
+        blown up asks for all memory.
         """
         box = self.storage.box(clouds)
         size = self.storage.bytes(box.shape, box)
-        if size > MAX_BYTES:
+        if self.most_bytes is None:
+            self.most_bytes = max(GRID_BYTES, GRID_GROWTH * size)
+        if size > self.most_bytes:
             extent = " x ".join(f"{n * self.storage.dx:.3g}" for n in box.shape)
             raise NoBody(f"t = {t:.6g} s: the points need a grid of {extent} m with {size:.1e} "
-                         f"bytes, and a reduced run has at most {MAX_BYTES:.0e}; have the latent "
+                         f"bytes, and this run has at most {self.most_bytes:.1e}; have the latent "
                          "coordinates left the range that the map was trained with?")
 
     def project(self, latent, samples, trial, dt, weights=None):
@@ -230,11 +240,17 @@ def with_gradients(cloud, gradients):
     return cloud._replace(points=cloud.points._replace(F=F))
 
 
-def next_gradients(cloud, L, dt):
-    """Return the `EvolvedGradients` of a `Cloud` after a step with velocity gradients L (n, d, d)
-    [1/s].
+def next_gradients(cloud, L, t, dt):
+    """Return the `EvolvedGradients` of a `Cloud` after a step from t [s] with velocity gradients L
+    (n, d, d) [1/s]. Raises `NoBody` where one is not finite.
     """
-    return EvolvedGradients(cloud.numbers, evolved(cloud.points.F, L, dt))
+    F = evolved(cloud.points.F, L, dt)
+    lost = cloud.numbers[~np.isfinite(F).all(axis=(1, 2))]
+    if len(lost):
+        raise NoBody(f"t = {t:.6g} s: the deformation gradients of {len(lost)} of {len(F)} points "
+                     f"are not finite after the step, the first that of point {lost[0]}; take a "
+                     "smaller dt")
+    return EvolvedGradients(cloud.numbers, F)
 
 
 def ldm_stepper(g, quadrature, law, gravity, projection="linear", **options):

@@ -161,6 +161,7 @@ def test_a_body_that_has_blown_up_does_not_ask_for_all_memory():
     g = Affine(2)
     stepper = ldm_stepper(g, lagrangian(points, 800.0 * V0, V0, 0.17, 2), FixedCorotated(3e3, 4e3),
                           np.zeros(2))
+    stepper.step(start_state(g.rest), np.arange(20), 0.0, 1e-3)
     xhat = 1700.0 * g.rest
     assert np.ptp(g.place(points, xhat), axis=0).min() > 1000.0
     with pytest.raises(NoBody, match="have the latent coordinates left the range"):

@@ -55,7 +55,8 @@ def test_a_state_reads_no_load_before_its_interval():
 
 def test_features_are_of_second_order():
     a, before, u = np.array([2.0, 3.0]), np.array([1.0, 5.0]), np.array([7.0])
-    assert features_of(a, before, u).tolist() == [2.0, 3.0, 1.0, -2.0, 7.0, 4.0, 6.0, 9.0]
+    found = features_of(a, before, u, np.triu_indices(2))
+    assert found.tolist() == [2.0, 3.0, 1.0, -2.0, 7.0, 4.0, 6.0, 9.0]
 
 
 def test_noise_asks_for_more_smoothing():
@@ -75,6 +76,8 @@ def test_a_run_that_explodes_is_stopped_with_a_sentence():
 @pytest.mark.parametrize(("change", "sentence"), [
     (lambda a, u: (a[0], u), "expected (runs, intervals, r)"),
     (lambda a, u: (a, u[:, 1:]), "expected (runs, intervals, r)"),
+    (lambda a, u: (a[:, :1], u[:, :1]), "runs of one interval"),
+    (lambda a, u: (a, u[..., [0, 0]], 1e-18), "too small for features that depend on each other"),
     (lambda a, u: (a * np.nan, u), "leave out runs that broke down"),
     (lambda a, u: (0.0 * a, u), "expected runs that move"),
     (lambda a, u: (a[:1], u[:1]), "one training run: expected at least two"),

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm_ref.rom.evolution import ORIGINS
+from mpm_ref.rom.evolution import EVOLVED, GRADIENTS, MAP
 from mpm_ref.rom.study.errors import PositionErrors
 from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.run import PROJECTIONS, RunOptions
@@ -27,7 +27,6 @@ from .studies import GRAVITY, POKES, TORSION, poked_again
 from .tables import POINTS, POKED, TESTED
 
 NAME = "ldm.evolved"
-MAP, EVOLVED = ORIGINS
 MODES = {"poke": (6, 12, 24), "gravity": (4, 7), "torsion": (7,)}    # of POD, by study
 NOTE = "one training, one draw of samples"
 COLUMNS = ("table", "map", "F", "scheme", "points", "origin", "centroid", "displacement")
@@ -45,8 +44,8 @@ class Case(NamedTuple):
 @experiment(NAME, title="LDM: deformation gradients evolved on the grid",
             profiles=("standard",), budget={"standard": 2400})
 def evolved_gradients(run):
-    """Record errors of pokes by networks, beside the printed ones, and of all studies by both
-    origins of F.
+    """Record errors of pokes by networks, beside the printed ones, and of all studies with
+    both deformation gradients.
     """
     rows = []
     for case in compared_cases():
@@ -71,11 +70,11 @@ def judged_rows(run, table, tests):
     rows, model = [], trained(POKES.name)
     case = Case(POKES.name, tests, model.field, model.rest)
     plans = [(EVOLVED, one) for one in PROJECTIONS] + [(MAP, PROJECTIONS[1])]
-    for (origin, projection), points in run.progress([*product(plans, (None, POINTS))], table):
-        options = RunOptions("lagrangian", projection, points, deformation_gradient=origin)
+    for (gradient, projection), points in run.progress([*product(plans, (None, POINTS))], table):
+        options = RunOptions("lagrangian", projection, points, deformation_gradient=gradient)
         errors = errors_of(run, table, case, options)
         name = f"{options.name}.{points or 'all'}"
-        if origin == EVOLVED:
+        if gradient == EVOLVED:
             record_errors(run, f"{table}.{name}.{EVOLVED}", errors, tests.scale, NOTE)
         else:
             record_errors(run, f"{NAME}.{table}.{name}.{MAP}", errors, tests.scale, NOTE,
@@ -96,18 +95,18 @@ def compared_cases():
 
 
 def compared_rows(run, case):
-    """Record the errors of a `Case` with all points, and with a few, by both origins of F; and the
-    ratio of the errors with all points. Return rows of them.
+    """Record the errors of a `Case` with all points, and with a few, with both deformation
+    gradients; and the ratio of the errors with all points. Return rows of them.
     """
     rows = []
     for points in (None, POINTS):
         errors = {}
-        for origin in ORIGINS:
-            options = RunOptions(points=points, deformation_gradient=origin)
-            errors[origin] = errors_of(run, "", case, options)
-            record_errors(run, f"{NAME}.{case.name}.{points or 'all'}.{origin}", errors[origin],
+        for gradient in GRADIENTS:
+            options = RunOptions(points=points, deformation_gradient=gradient)
+            errors[gradient] = errors_of(run, "", case, options)
+            record_errors(run, f"{NAME}.{case.name}.{points or 'all'}.{gradient}", errors[gradient],
                           case.tests.scale, comparator="info")
-            rows.append(row("", case, options, errors[origin]))
+            rows.append(row("", case, options, errors[gradient]))
         if points is None:
             run.record(f"{NAME}.{case.name}.ratio", errors[EVOLVED].origin / errors[MAP].origin,
                        unit="1", scale=case.tests.scale, comparator="<=", bound=1.0,

@@ -1,6 +1,7 @@
-"""Models computed from training runs, for runs under a gravity that changes: LDM's modes, responses
-to steps that are superposed, and a correction of coarse runs, of runs under constant gravity;
-operators that are inferred, of runs under random loads.
+"""Models for runs under a gravity that changes, computed from training runs.
+
+Training runs under constant gravity give LDM's modes, responses to steps, and the correction of
+coarse runs; those under random loads give inferred operators.
 """
 
 from functools import partial
@@ -9,6 +10,7 @@ from time import process_time
 import numpy as np
 
 from mpm_ref.rom.correction import carrier, fit_correction
+from mpm_ref.rom.evolution import EVOLVED, MAP
 from mpm_ref.rom.fields.numbered import numbered
 from mpm_ref.rom.fields.pod import directions, modes
 from mpm_ref.rom.inference import fit_dynamics
@@ -18,7 +20,7 @@ from mpm_ref.rom.study.run import RunOptions, ldm_run
 from .arm_models import CORRECTIONS
 from .live_runs import TICKS, LiveMethod, full_states
 
-SOURCES = {"map": "of the map", "evolved": "evolved"}       # of F, in words
+F_IN_WORDS = {MAP: "of the map", EVOLVED: "evolved"}
 
 
 def ldm_method(name, training, r, **options):
@@ -29,7 +31,7 @@ def ldm_method(name, training, r, **options):
     return LiveMethod(name, partial(reduced_states, training.scene, g, options),
                       partial(numbered(g).place, points), fit, training.cpu,
                       settings=f"r = {r}, {options.points or 'all'} samples, F "
-                      f"{SOURCES[options.deformation_gradient]}")
+                      f"{F_IN_WORDS[options.deformation_gradient]}")
 
 
 def reduced_states(scene, g, options, load):

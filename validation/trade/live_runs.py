@@ -177,9 +177,12 @@ def step_training(scene, gravity):
 
 def load_training(scene, loads):
     """Return the `LoadTraining` of runs of a scene under loads (runs, TICKS, 3) [m/s^2], with the
-    fewest parts of a tick that are at least PARTS and divide its steps.
+    fewest parts of a tick that are at least PARTS and divide its steps. Raises ValueError for fewer
+    steps than PARTS in a tick.
     """
     steps, x, cpu = scene.steps // TICKS, [], 0.0
+    if steps < PARTS:
+        raise ValueError(f"{scene.steps} steps: expected at least {PARTS * TICKS}")
     parts = next(n for n in range(PARTS, steps + 1) if steps % n == 0)
     for load in loads:
         clock, states = process_time(), full_states(scene, load, parts)

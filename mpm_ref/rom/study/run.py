@@ -9,7 +9,7 @@ import numpy as np
 
 from ...sampling import Regular, sample
 from ...shapes.inside import solid
-from ..evolution import ORIGINS
+from ..evolution import EVOLVED, MAP
 from ..fields.blocks import body_blocks
 from ..fields.numbered import is_numbered, numbered
 from ..fields.pod import PodModes
@@ -57,15 +57,16 @@ class ReducedRun(NamedTuple):
                             # `Latent` at which a step begins, which gives its `SampleSet`
     dt: float               # length of a step [s]
     steps: int
+    has_memory: bool = False    # whether a state is more than its latent coordinates and rates
 
     def states(self, earlier=()):
         """Yield the `RunState` of all time levels, the start first. earlier: (`Latent`, `Report` or
         None) of the first states, if these are known; their samples are drawn again, so that those
-        of later steps are the run's. Where F is evolved, which they lack, all but the start are
-        computed again.
+        of later steps are the run's. Where the run has a memory, all but the start are computed
+        again.
         """
         earlier, samples = earlier or [(self.find_start(), None)], None
-        if self.stepper.evolves:
+        if self.has_memory:
             earlier = earlier[:1]
         sampler = self.make_sampler(earlier[0][0].xhat)
         for k, (latent, report) in enumerate(earlier):
@@ -101,7 +102,7 @@ class RunOptions(NamedTuple):
                                 # over that of one whose is free (see `rom.prescribed`)
     boundary_cells: str = WHOLE     # of Eulerian points, one of `eulerian.BOUNDARY_CELLS`; "cut" is
                                     # ours
-    deformation_gradient: str = ORIGINS[0]      # of material points: of the "map", or "evolved" on
+    deformation_gradient: str = MAP     # of material points: of the "map", or "evolved" on
                                     # the grid (see `rom.evolution`), which is ours
 
     @property
@@ -117,7 +118,8 @@ def ldm_run(full, g, options, rest, seed=0):
     clock = full.problem.clock
     full, g = with_numbers(full, g, options)
     return ReducedRun(ldm_model(full, g, options), lambda: ldm_start(full, g, rest),
-                      lambda xhat: ldm_sampler(full, g, options, xhat, seed), clock.dt, clock.steps)
+                      lambda xhat: ldm_sampler(full, g, options, xhat, seed), clock.dt, clock.steps,
+                      options.deformation_gradient == EVOLVED)
 
 
 def with_numbers(full, g, options):
@@ -171,7 +173,7 @@ def require_own_points(full, options):
 
 def require_material_points(options):
     """Raise ValueError where F is evolved at quadrature points that do not move with the body."""
-    if options.deformation_gradient == "evolved" and options.quadrature != QUADRATURES[0]:
+    if options.deformation_gradient == EVOLVED and options.quadrature != QUADRATURES[0]:
         raise ValueError(f"deformation_gradient = 'evolved' with quadrature = "
                          f"{options.quadrature!r}: expected {QUADRATURES[0]!r}, whose points are "
                          "material points that can keep F; or deformation_gradient = 'map'")

@@ -6,7 +6,7 @@ import numpy as np
 from msgspec import Meta, Struct, field, to_builtins
 
 from ...shapes.quantities import Count, Natural, NotNegative, PerCell, Positive, Seed
-from ..evolution import ORIGINS
+from ..evolution import GRADIENTS
 from ..fields.architecture import HIDDEN
 from ..fields.pod_fields import Sizes
 from ..latent import VELOCITIES
@@ -172,7 +172,7 @@ class MapRunTable(StudyTable):
         one_of("velocity", self.velocity, VELOCITIES)
         one_of("precision", self.precision, PRECISIONS)
         one_of("boundary_cells", self.boundary_cells, BOUNDARY_CELLS)
-        one_of("deformation_gradient", self.deformation_gradient, ORIGINS)
+        one_of("deformation_gradient", self.deformation_gradient, GRADIENTS)
 
     @property
     def options(self):

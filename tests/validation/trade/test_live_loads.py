@@ -267,7 +267,7 @@ def test_a_method_that_breaks_down_has_no_positions():
                       TimedPositions)
 
 
-def test_operators_are_compared_over_many_runs_with_their_training():
+def test_operators_are_compared_over_many_runs_with_their_training(scene):
     run, rows = Records(), rows_of()
     rows = [row._replace(cpu_fit=30.0) if row.method == "operators" else row for row in rows]
     record_body(run, "x", rows, "")
@@ -277,3 +277,5 @@ def test_operators_are_compared_over_many_runs_with_their_training():
     assert run.values["x.operators.pays"] == pytest.approx(30.0 / (0.1 - 0.01))
     record_body(run, "x", rows_of(operators=(np.inf, 0.01)), "")
     assert run.values["x.operators.gain"] == 0.0
+    with pytest.raises(ValueError, match="36 steps: expected at least 54"):
+        load_training(with_(scene, steps=36), ())
