@@ -19,7 +19,8 @@ confidence: how sure the number is.
 Groups name numbers by patterns of ids, `*` for any text:
     [[tolerance]]  how far a number may be off, and why; each "~" needs one
     [[chosen]]     records whose settings were picked on the runs that are judged: "chosen"
-    [[smaller]]    records of a profile whose scenes are smaller than the printed ones: no credit
+    [[smaller]]    results of scenes that are smaller than the printed ones at all profiles but
+                   "paper": no credit
     [[cause]]      why numbers are missed, and the experiment that shows it
     [[headline]]   a claim of the paper, with the numbers that stand for it
 """
@@ -35,6 +36,7 @@ import msgspec
 from .judge import Criterion, accepted
 
 FOLDER = Path(__file__).parents[1] / "targets"
+PRINTED_SIZE = "--profile paper"    # in the command of a record
 ROUNDED = 0.1       # of a printed number: how far another print of it may be off
 
 
@@ -71,11 +73,10 @@ class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Smaller(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Records of a profile at which scenes are smaller than the printed ones."""
+    """Printed results of which all profiles but "paper" have smaller scenes."""
 
     ids: list[str]
     why: str
-    profile: str = "standard"
 
 
 class Cause(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -141,8 +142,8 @@ class Targets(dict):
 
     def is_smaller(self, record):
         """Return whether a `Measurement` is of scenes that are smaller than the printed ones."""
-        groups = [group for group in self.smaller if record.command.endswith(group.profile)]
-        return first_of(groups, record.target) is not None
+        at_size = PRINTED_SIZE in record.command
+        return not at_size and first_of(self.smaller, record.target) is not None
 
     def cause(self, record_id):
         """Return the `Cause` of a missed number, or None where it is not known."""
@@ -180,8 +181,10 @@ def load(folder: Path = FOLDER) -> Targets:
 
 
 def require_used(content, targets, file):
-    """Raise ValueError where a pattern of a tolerance or headline matches no target of its file."""
-    for group in (*content.tolerance, *content.headline):
+    """Raise ValueError where a pattern of a tolerance, a headline or smaller scenes matches no
+    target of its file.
+    """
+    for group in (*content.tolerance, *content.headline, *content.smaller):
         for pattern in group.ids:
             if not any(fnmatchcase(target.id, pattern) for target in targets):
                 raise ValueError(f"{file}: no target matches ids = {pattern!r} of a "

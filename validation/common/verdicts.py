@@ -63,9 +63,11 @@ def judged(record, targets):
     target = targets[base]
     verdict, interval = judge_printed(record.value, targets.criterion(base))
     kind = "variant" if variants else "setting" if target.kind == "setting" else "result"
-    if passes(verdict) and (INCOMPLETE & {*variants} or targets.is_smaller(record)):
+    verdict = chosen(record, targets, verdict)
+    smaller = kind != "setting" and targets.is_smaller(record)
+    if passes(verdict) and (INCOMPLETE & {*variants} or smaller):
         verdict = "uncredited"
-    return Judged(kind, chosen(record, targets, verdict), interval, target, variants)
+    return Judged(kind, verdict, interval, target, variants)
 
 
 def chosen(record, targets, verdict):

@@ -166,9 +166,10 @@ def test_a_tolerance_gives_the_rule_and_its_reason(tmp_path):
     ("", SAME, r"target 'toy\.a': comparator '~' needs factor= or digits=.* \[\[tolerance\]\]"),
     (ABOUT.format("factor = 2"), GOOD, r"'toy\.a': factor = 2.0 means nothing to comparator '='"),
     (ABOUT.format("factor = 2").replace("toy.a", "toy.b"), SAME, r"no target matches .*'toy\.b'"),
+    ('[[smaller]]\nids = ["toy.c*"]\nwhy = "small"\n', GOOD, r"'toy\.c\*' of a smaller"),
     (ABOUT.format("").replace("why", "reason"), GOOD, r"toy\.toml: .*`reason`"),
     (ABOUT.format("side = 2"), GOOD, r"toy\.toml: .*`side`"),
-], ids=["none", "unused", "unmatched", "no-reason", "unknown"])
+], ids=["none", "unused", "unmatched", "unmatched-size", "no-reason", "unknown"])
 def test_a_rule_that_is_not_complete_is_refused(tmp_path, group, record, fault):
     with pytest.raises(ValueError, match=fault):
         targets.load(about(tmp_path, group, record))

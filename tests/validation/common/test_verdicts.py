@@ -173,7 +173,9 @@ NUMBERS = [printed("toy.error", "<="), printed("toy.count", "~"), printed("toy.t
            printed("toy.printed.step", "=")]
 TARGETS = Targets({t.id: t for t in NUMBERS}, [TargetFile(
     "toy", [], tolerance=[Tolerance(["toy.count"], "why", factor=2.0)],
-    chosen=[Choice(["toy.picked", "toy.error.modes", "trade.picked"], "on the test")],
+    chosen=[Choice(["toy.picked", "toy.error.modes", "trade.picked"], "on the test")])])
+SMALLER = Targets(TARGETS, [TargetFile("toy", [], tolerance=[], chosen=[
+    Choice(["toy.picked", "toy.error.modes"], "on the test")],
     smaller=[Smaller(["toy.*"], "an eighth of the points")])])
 
 
@@ -212,12 +214,22 @@ def test_a_record_is_judged_by_todays_rules(record, kind, verdict):
     assert (one.kind, one.verdict) == (kind, verdict)
 
 
-@pytest.mark.parametrize(("profile", "verdict"), [("standard", "uncredited"), ("paper", "better")])
-def test_a_number_of_smaller_scenes_gets_no_credit_at_their_profile(profile, verdict):
+@pytest.mark.parametrize(("id", "profile", "verdict"), [
+    ("toy.error", "standard", "uncredited"), ("toy.error", "quick", "uncredited"),
+    ("toy.error", "standard --seed 3", "uncredited"), ("toy.error", "paper", "better"),
+    ("toy.error", "paper --seed 3", "better"), ("toy.picked", "standard", "chosen"),
+    ("toy.error.modes", "standard", "chosen"), ("toy.error.partial", "paper", "uncredited")])
+def test_a_result_of_smaller_scenes_gets_no_credit(id, profile, verdict):
     command = f"python -m validation run toy --profile {profile}"
-    record = msgspec.structs.replace(measured("toy.error", 0.5), command=command)
-    assert judged(record, TARGETS).verdict == verdict
-    assert judged(msgspec.structs.replace(record, value=9.0), TARGETS).verdict == "miss"
+    record = msgspec.structs.replace(measured(id, 0.5), command=command)
+    assert judged(record, SMALLER).verdict == verdict
+    assert judged(msgspec.structs.replace(record, value=9.0), SMALLER).verdict == "miss"
+
+
+def test_a_setting_has_no_size():
+    command = "python -m validation run toy --profile standard"
+    record = msgspec.structs.replace(measured("toy.step", 1.0), command=command)
+    assert judged(record, SMALLER).verdict == "pass"
 
 
 def test_a_changed_rule_changes_the_verdict_of_a_stored_record():
