@@ -8,11 +8,17 @@ from mpm_ref.body import Body, particles_at
 from mpm_ref.explicit import Scheme, Stepper
 from mpm_ref.materials import FixedCorotated, NoFlow
 from mpm_ref.rom.evolution import EvolvedGradients
+from mpm_ref.rom.fields.affine import Affine
 from mpm_ref.rom.fields.pod import modes
+from mpm_ref.rom.kinematics import Kinematics, NoBody
 from mpm_ref.rom.latent import Latent, start_state
+from mpm_ref.rom.quadrature import Cloud
 from mpm_ref.rom.quadrature.eulerian import Eulerian
 from mpm_ref.rom.quadrature.lagrangian import lagrangian
-from mpm_ref.rom.step import ldm_stepper
+from mpm_ref.rom.step import ldm_stepper, next_gradients
+from mpm_ref.rom.study.full_model import ldm_full_model
+from mpm_ref.rom.study.run import RunOptions, ldm_model
+from validation.ldm.studies import fallen
 
 DX, DT, RHO, POINTS = 0.17, 0.01, 800.0, 18
 LAW = FixedCorotated(3e3, 4e3)
@@ -98,15 +104,35 @@ def test_points_that_enter_take_the_gradient_of_the_map():
 
 def test_a_point_between_the_samples_keeps_its_gradient():
     g, xhat, vhat = anything(2)
-    start = Latent(xhat, vhat, xhat)
-    far = np.array([0, 1])
-    few = reduced_run(g, start, 1, far, deformation_gradient="evolved")
-    numbers = few.gradients.numbers
-    assert len(far) < len(numbers) < POINTS     # neighbours keep theirs too
-    again = reduced_run(g, few, 1, far, deformation_gradient="evolved")
-    forgotten = reduced_run(g, few._replace(gradients=None), 1, far,
-                            deformation_gradient="evolved")
-    assert abs(again.vhat - forgotten.vhat).max() > 1e-3 * abs(again.vhat).max()
+    start, samples = Latent(xhat, vhat, xhat), np.array([0, 1])
+    few = reduced_run(g, start, 1, samples, deformation_gradient="evolved")
+    numbers, F = few.gradients
+    assert len(samples) < len(numbers) < POINTS
+    neighbour = np.flatnonzero(~np.isin(numbers, samples))[0]
+
+    def step(numbers, F):
+        latent = few._replace(gradients=EvolvedGradients(numbers, F))
+        return reduced_run(g, latent, 1, samples, deformation_gradient="evolved").vhat
+
+    changed = F.copy()
+    changed[neighbour] *= 1.1
+    assert abs(step(numbers, changed) - step(numbers, F)).max() > 1e-6
+    foreign = np.setdiff1d(np.arange(POINTS), numbers)[:1]
+    known = np.union1d(numbers, foreign)
+    more = np.tile(2.0 * np.eye(2), (len(known), 1, 1))
+    more[np.isin(known, numbers)] = F
+    assert np.array_equal(step(known, more), step(numbers, F))
+
+
+def test_a_gradient_that_is_not_finite_stops_the_run_with_its_point():
+    g, xhat, vhat = anything(2)
+    few = reduced_run(g, Latent(xhat, vhat, xhat), 1, deformation_gradient="evolved")
+    few.gradients.F[5] = np.nan
+    with pytest.raises(NoBody):
+        reduced_run(g, few, 1, deformation_gradient="evolved")
+    cloud = Cloud(Kinematics(None, None, few.gradients.F), None, None, None, {}, np.arange(POINTS))
+    with pytest.raises(NoBody, match=r"of 1 of 18 points are not finite .* of point 5; take"):
+        next_gradients(cloud, np.zeros((POINTS, 2, 2)), 0.0, DT)
 
 
 def test_unknown_gradients_and_points_of_cells_are_refused():
@@ -117,3 +143,12 @@ def test_unknown_gradients_and_points_of_cells_are_refused():
     cells = Eulerian(g.X, RHO, lambda X: X[:, 0] - 1.0, g.X, DX, 2)
     with pytest.raises(ValueError, match="deformation_gradient = 'evolved': expected 'map', since"):
         ldm_stepper(g, cells, LAW, GRAVITY[:2], deformation_gradient="evolved")
+
+
+@pytest.mark.parametrize("quadrature", ["eulerian", "resampled"])
+def test_a_study_refuses_evolved_gradients_without_material_points(quadrature):
+    full = ldm_full_model(fallen(1.0))
+    options = RunOptions(quadrature, deformation_gradient="evolved")
+    with pytest.raises(ValueError, match=f"'evolved' with quadrature = '{quadrature}': expected "
+                       "'lagrangian'"):
+        ldm_model(full, Affine(3), options)

@@ -18,7 +18,8 @@ from mpm_ref.rom.study.study import load
 from mpm_ref.store import manifest
 from mpm_ref.store.results import Results
 
-WAYS = {"redrawn": "points = 12", "all": "", "evolved": 'deformation_gradient = "evolved"',
+WAYS = {"redrawn": "points = 12", "all": "",
+        "evolved": 'points = 12\ndeformation_gradient = "evolved"',
         "kept": 'points = 12\nsamples = "kept"',
         "nonlinear": 'points = 12\nprojection = "nonlinear"\nvelocity = "difference"',
         "eulerian": 'points = 20\nquadrature = "eulerian"\nvelocity = "transported"'}

@@ -119,9 +119,10 @@ def simulated(scene):
     return tuple(np.array(field) for field in zip(*states))
 
 
+@pytest.mark.parametrize("gradient", ["map", "evolved"])
 @pytest.mark.parametrize(("transfer", "most"), [("pic", 1e-12), ("mls", 1e-8)])
 @pytest.mark.parametrize("lifted", [0.0, 0.06])
-def test_a_run_on_its_own_displacements_is_that_of_the_full_model(transfer, most, lifted):
+def test_a_run_on_its_own_displacements_is_that_of_the_full_model(transfer, most, lifted, gradient):
     """Also from a start whose velocity is no sum of modes, since it jumps between the bodies."""
     text = SCENE.replace("[0.1, 0.2]", f"[0.1, {0.2 + lifted}]").replace(
         "[0.5, 0.4]", f"[0.5, {0.4 + lifted}]").replace('"pic"', f'"{transfer}"')
@@ -129,7 +130,8 @@ def test_a_run_on_its_own_displacements_is_that_of_the_full_model(transfer, most
     x, F = simulated(scene)
     full = ldm_full_model(scene)
     g = numbered(modes(full.X, x, F, 8))
-    states = list(ldm_run(full, g, RunOptions(), np.zeros(8)).states())
+    options = RunOptions(deformation_gradient=gradient)
+    states = list(ldm_run(full, g, options, np.zeros(8)).states())
     found = np.array([g.place(full.map_points, state.latent.xhat) for state in states])
     start = states[0].latent
     assert abs(g.velocity(full.map_points, start.xhat, start.vhat) - full.v).max() > 1e-3
@@ -203,8 +205,9 @@ def test_a_run_of_several_bodies_takes_maps_of_modes_alone():
 @pytest.mark.parametrize("transfer", ["pic", "apic", "mls"])
 @pytest.mark.parametrize("options", [
     RunOptions(points=12, samples="pivoted"), RunOptions(points=12, samples="kept"),
-    RunOptions(driven_weight=16.0), RunOptions(projection="nonlinear")],
-    ids=["pivoted", "kept", "weights", "nonlinear"])
+    RunOptions(driven_weight=16.0), RunOptions(projection="nonlinear"),
+    RunOptions(points=12, deformation_gradient="evolved")],
+    ids=["pivoted", "kept", "weights", "nonlinear", "evolved"])
 def test_numbers_of_points_change_no_bit(options, transfer, monkeypatch):
     """A run on modes by the numbers of points is that by their places at rest."""
     hard = SCENE.index('[[body]]\nname = "hard"')
