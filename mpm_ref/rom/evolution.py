@@ -23,15 +23,15 @@ class EvolvedGradients(NamedTuple):
     numbers: np.ndarray     # (n,) of the points, sorted
     F: np.ndarray           # (n, d, d)
 
-    def of(self, numbers, F):
+    def at(self, numbers, F):
         """Return the deformation gradients (m, d, d) of points of these numbers; of points that
         have none here, those in F (m, d, d).
         """
         if np.array_equal(numbers, self.numbers):
             return self.F
-        at = np.minimum(np.searchsorted(self.numbers, numbers), len(self.numbers) - 1)
-        known = self.numbers[at] == numbers
-        return np.where(known[:, None, None], self.F[at], F)
+        i = np.minimum(np.searchsorted(self.numbers, numbers), len(self.numbers) - 1)
+        known = self.numbers[i] == numbers
+        return np.where(known[:, None, None], self.F[i], F)
 
 
 def evolved(F, L, dt):

@@ -32,7 +32,7 @@ NOTE = "one training, one draw of samples"
 COLUMNS = ("table", "map", "F", "scheme", "points", "origin", "centroid", "displacement")
 
 
-class Case(NamedTuple):
+class MapCase(NamedTuple):
     """A map, and the runs on it."""
 
     name: str               # in records
@@ -68,7 +68,7 @@ def judged_rows(run, table, tests):
     beside them those of the map's F by linear projection. Return rows of all.
     """
     rows, model = [], trained(POKES.name)
-    case = Case(POKES.name, tests, model.field, model.rest)
+    case = MapCase(POKES.name, tests, model.field, model.rest)
     plans = [(EVOLVED, one) for one in PROJECTIONS] + [(MAP, PROJECTIONS[1])]
     for (gradient, projection), points in run.progress([*product(plans, (None, POINTS))], table):
         options = RunOptions("lagrangian", projection, points, deformation_gradient=gradient)
@@ -84,18 +84,18 @@ def judged_rows(run, table, tests):
 
 
 def compared_cases():
-    """Yield the `Case` of each map on which both origins of F are compared."""
+    """Yield the `MapCase` of each map on which both origins of F are compared."""
     for study, nets in ((POKES, ()), (GRAVITY, ("gravity-r7",)),
                         (TORSION, [f"torsion-{seed}" for seed in range(SEEDS)])):
         tests = references(study, TESTED if study is POKES else None)
         for net in nets:
-            yield Case(net, tests, trained(net).field, trained(net).rest)
+            yield MapCase(net, tests, trained(net).field, trained(net).rest)
         for r in MODES[study.name]:
-            yield Case(f"{study.name}.pod-{r}", tests, pod(study.name, r), np.zeros(r))
+            yield MapCase(f"{study.name}.pod-{r}", tests, pod(study.name, r), np.zeros(r))
 
 
 def compared_rows(run, case):
-    """Record the errors of a `Case` with all points, and with a few, with both deformation
+    """Record the errors of a `MapCase` with all points, and with a few, with both deformation
     gradients; and the ratio of the errors with all points. Return rows of them.
     """
     rows = []
@@ -115,7 +115,7 @@ def compared_rows(run, case):
 
 
 def errors_of(run, table, case, options):
-    """Return the `PositionErrors` of the runs of a `Case`, which an interrupted run has cached."""
+    """Return the `PositionErrors` of the runs of a case, which an interrupted run has cached."""
     key = f"{table}{case.name}.{options.name}.{options.points}.{options.deformation_gradient}"
     return PositionErrors(*run.cached(key, partial(case.tests.run_errors, case.g, case.rest,
                                                    options)))

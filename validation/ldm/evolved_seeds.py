@@ -6,7 +6,7 @@ from mpm_ref.rom.study.errors import PositionErrors
 from mpm_ref.rom.study.run import RunOptions
 
 from ..common.registry import experiment
-from .evolved_gradients import EVOLVED, Case, errors_of
+from .evolved_gradients import EVOLVED, MapCase, errors_of
 from .networks import POKE_NETS, trained
 from .references import record_errors, references
 from .studies import POKES
@@ -22,8 +22,10 @@ def seeds(run):
     tests, rows = references(POKES), []
     for points in (None, POINTS):
         options, name = RunOptions(points=points, deformation_gradient=EVOLVED), points or "all"
-        errors = {net: errors_of(run, "", Case(net, tests, trained(net).field, trained(net).rest),
-                                 options) for net in run.progress(POKE_NETS, "trainings")}
+        errors = {}
+        for net in run.progress(POKE_NETS, "trainings"):
+            case = MapCase(net, tests, trained(net).field, trained(net).rest)
+            errors[net] = errors_of(run, "", case, options)
         record_seeds(run, f"{NAME}.{options.name}.{name}", errors, tests.scale)
         rows += [(net, name, *one) for net, one in errors.items()]
     run.table("errors", ("net", "points", "origin", "centroid", "displacement"), rows)

@@ -171,11 +171,11 @@ def record_operators(run, name, rows, scale):
                    "training included")
 
 
-def record_gain(run, name, found, scale):
+def record_gain(run, name, compared, scale):
     """Record how many times LDM's CPU time the cheapest other method takes with at most its error;
-    one that broke down gains nothing. found = (rows, method of LDM).
+    one that broke down gains nothing. compared = (rows, method of LDM).
     """
-    rows, method = found
+    rows, method = compared
     ldm = next(row for row in rows if row.method == method)
     others = [row for row in rows if not row.method.startswith("ldm") and row.error <= ldm.error]
     cheapest = min(others, key=lambda row: row.cpu_run)

@@ -106,13 +106,13 @@ def operators_method(training, r):
     U, a = directions(training.X, training.x.reshape(-1, *shape), r)
     model = fit_dynamics(a.reshape(runs, levels, r),
                          np.repeat(training.loads, training.parts, axis=1))
-    return LiveMethod("operators", partial(inferred_states, model, training.parts),
+    return LiveMethod("operators", partial(operator_states, model, training.parts),
                       lambda a: training.X + U @ a, process_time() - clock, training.cpu,
                       settings=f"r = {r}, {runs} training runs under random loads, smoothing "
                       f"{model.smoothing:g}")
 
 
-def inferred_states(model, parts, load):
+def operator_states(model, parts, load):
     """Yield the latent coordinates of `LatentDynamics` after each tick of a load; parts: intervals
     of a tick.
     """

@@ -50,7 +50,7 @@ def test_trainings_have_a_median_and_a_spread(run):
 def test_other_maps_are_judged_by_the_error_with_their_own_gradient(run, monkeypatch):
     monkeypatch.setattr(experiment, "errors_of", lambda run, table, case, options: PositionErrors(
         *3 * [{"map": 0.04, "evolved": 0.01}[options.deformation_gradient]]))
-    rows = experiment.compared_rows(run, experiment.Case("pod", TESTS, None, None))
+    rows = experiment.compared_rows(run, experiment.MapCase("pod", TESTS, None, None))
     value, rule = run.found["ldm.evolved.pod.ratio"]
     assert (value, rule["comparator"], rule["bound"]) == (0.25, "<=", 1.0)
     assert [one[2:5] for one in rows] == [(origin, "lagrangian_linear", points)
