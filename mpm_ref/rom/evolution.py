@@ -23,7 +23,7 @@ class EvolvedGradients(NamedTuple):
     numbers: np.ndarray     # (n,) of the points, sorted
     F: np.ndarray           # (n, d, d)
 
-    def at(self, numbers, F):
+    def gradients_of(self, numbers, F):
         """Return the deformation gradients (m, d, d) of points of these numbers; of points that
         have none here, those in F (m, d, d).
         """

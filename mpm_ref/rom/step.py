@@ -236,7 +236,7 @@ def with_gradients(cloud, gradients):
     """Return a `Cloud` whose points have the `EvolvedGradients` of the step before, if any."""
     if gradients is None:
         return cloud
-    F = gradients.at(cloud.numbers, cloud.points.F)
+    F = gradients.gradients_of(cloud.numbers, cloud.points.F)
     return cloud._replace(points=cloud.points._replace(F=F))
 
 

@@ -96,10 +96,10 @@ def test_points_that_enter_take_the_gradient_of_the_map():
     F = np.arange(16.0).reshape(4, 2, 2)
     held = EvolvedGradients(np.array([2, 5, 7, 9]), F)
     asked, of_map = np.array([0, 5, 8, 9, 11]), -np.ones((5, 2, 2))
-    found = held.at(asked, of_map)
+    found = held.gradients_of(asked, of_map)
     np.testing.assert_array_equal(found[[1, 3]], F[[1, 3]])
     np.testing.assert_array_equal(found[[0, 2, 4]], of_map[:3])
-    assert held.at(held.numbers, of_map) is F
+    assert held.gradients_of(held.numbers, of_map) is F
 
 
 def test_a_point_between_the_samples_keeps_its_gradient():
