@@ -22,6 +22,10 @@ SMOOTHING = tuple(10.0**k for k in range(-12, -1))
 FOLDS = 4           # of the runs, each left out once
 
 
+class NotDefinite(ValueError):
+    """The matrix of a regression is not positive definite."""
+
+
 class LatentDynamics(NamedTuple):
     """Learned operators on r latent coordinates and m components of a load."""
 
@@ -89,9 +93,9 @@ def regression(a, u, smoothing):
         try:
             return cho_solve(cho_factor(M), A.T @ y) / size[:, None]
         except np.linalg.LinAlgError:
-            raise ValueError(f"smoothing = {smoothing:g} is too small for features that depend on "
-                             "each other, such as loads that keep one direction: expected more, "
-                             "such as 1e-6") from None
+            raise NotDefinite(f"smoothing = {smoothing:g} is too small for features that depend "
+                              "on each other, such as loads that keep one direction: expected "
+                              "more, such as 1e-6") from None
 
 
 def choose_smoothing(a, u):
@@ -111,12 +115,14 @@ def choose_smoothing(a, u):
 
 
 def left_out(a, u, fold, smoothing):
-    """Return the sum of squared errors of the runs of a fold by operators of the others."""
+    """Return the sum of squared errors of the runs of a fold by operators of the others; infinite
+    where the smoothing is too small, or a run breaks down.
+    """
     others = np.setdiff1d(np.arange(len(a)), fold)
-    model = LatentDynamics(regression(a[others], u[others], smoothing), smoothing)
     try:
+        model = LatentDynamics(regression(a[others], u[others], smoothing), smoothing)
         return sum(np.sum((np.array([*model.states(u[k])]) - a[k]) ** 2) for k in fold)
-    except NoBody:
+    except (NotDefinite, NoBody):
         return np.inf
 
 

@@ -65,7 +65,8 @@ class StepReport(NamedTuple):
 
 @dataclass
 class ReducedStepper:
-    """Advances latent coordinates by steps; `step` keeps no state but the grid's storage.
+    """Advances latent coordinates by steps; `step` keeps no state but the grid's storage
+    and the bound of its size.
 
     The spacing of the grid and the degree of its splines are the quadrature's. velocity is one of
     `latent.VELOCITIES`; v0 the velocities of numbered points that "previous" and "difference" take

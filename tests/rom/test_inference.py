@@ -88,6 +88,20 @@ def test_what_is_no_data_is_refused(change, sentence):
         fit_dynamics(*change(runs_of(true_dynamics(), u), u))
 
 
+def test_a_smoothing_that_is_too_small_is_not_chosen(monkeypatch):
+    u = loads(1)
+    a, solve = runs_of(true_dynamics(), u), inference.regression
+
+    def some_fail(a, u, smoothing):
+        if smoothing < 1e-5:
+            raise inference.NotDefinite
+        return solve(a, u, smoothing)
+
+    assert fit_dynamics(a, u).smoothing < 1e-5
+    monkeypatch.setattr(inference, "regression", some_fail)
+    assert fit_dynamics(a, u).smoothing >= 1e-5
+
+
 def test_runs_that_break_down_with_all_smoothings_are_refused(monkeypatch):
     u = loads(1)
     a = runs_of(true_dynamics(), u)

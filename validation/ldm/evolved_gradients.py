@@ -14,19 +14,16 @@ import numpy as np
 
 from mpm_ref.rom.evolution import EVOLVED, GRADIENTS, MAP
 from mpm_ref.rom.study.errors import PositionErrors
-from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.run import PROJECTIONS, RunOptions
-from mpm_ref.trajectories import history
 
 from ..common.registry import experiment
-from ..common.scenes import threads_for
 from ..common.seeding import generator
 from .networks import SEEDS, trained
 from .references import References, pod, record_errors, references
-from .studies import GRAVITY, POKES, TORSION, poked_again
-from .tables import POINTS, POKED, TESTED
+from .studies import GRAVITY, POKES, TORSION
+from .tables import POINTS, TESTED, poked_in_a_row
 
-NAME = "ldm.evolved"
+NAME, TABLE6 = "ldm.evolved", "ldm.table6"     # whose pokes in a row these are
 MODES = {"poke": (6, 12, 24), "gravity": (4, 7), "torsion": (7,)}    # of POD, by study
 NOTE = "one training, one draw of samples"
 COLUMNS = ("table", "map", "F", "scheme", "points", "origin", "centroid", "displacement")
@@ -50,17 +47,9 @@ def evolved_gradients(run):
     rows = []
     for case in compared_cases():
         rows += compared_rows(run, case)
-    rows += judged_rows(run, "ldm.table6", poked_in_a_row(run))
+    rows += judged_rows(run, TABLE6, poked_in_a_row(generator(run.seed, TABLE6)))
     rows += judged_rows(run, "ldm.table5", references(POKES))
     run.table("errors", COLUMNS, rows)
-
-
-def poked_in_a_row(run):
-    """Return the `References` of ten pokes one after the other, those of `ldm.table6`."""
-    angles = generator(run.seed, "ldm.table6").uniform(0.0, 2.0 * np.pi, POKED)
-    one = ldm_full_model(poked_again(angles))
-    with threads_for(one.problem.bodies):
-        return References(POKES.name, (one,), (history(one.problem).x,), 1)
 
 
 def judged_rows(run, table, tests):
@@ -84,7 +73,7 @@ def judged_rows(run, table, tests):
 
 
 def compared_cases():
-    """Yield the `MapCase` of each map on which both origins of F are compared."""
+    """Yield the `MapCase` of each map on which the two deformation gradients are compared."""
     for study, nets in ((POKES, ()), (GRAVITY, ("gravity-r7",)),
                         (TORSION, [f"torsion-{seed}" for seed in range(SEEDS)])):
         tests = references(study, TESTED if study is POKES else None)

@@ -1,14 +1,11 @@
 """Pokes with evolved F over several trainings of the map; `ldm.evolved` has one training."""
 
-import numpy as np
-
-from mpm_ref.rom.study.errors import PositionErrors
 from mpm_ref.rom.study.run import RunOptions
 
 from ..common.registry import experiment
 from .evolved_gradients import EVOLVED, MapCase, errors_of
 from .networks import POKE_NETS, trained
-from .references import record_errors, references
+from .references import record_seeds, references
 from .studies import POKES
 from .tables import POINTS
 
@@ -29,15 +26,3 @@ def seeds(run):
         record_seeds(run, f"{NAME}.{options.name}.{name}", errors, tests.scale)
         rows += [(net, name, *one) for net, one in errors.items()]
     run.table("errors", ("net", "points", "origin", "centroid", "displacement"), rows)
-
-
-def record_seeds(run, name, errors, scale):
-    """Record the `PositionErrors` {net: ..} of trainings, their median and their spread."""
-    for net, one in errors.items():
-        record_errors(run, f"{name}.{net}", one, scale, comparator="info")
-    origins = [one.origin for one in errors.values()]
-    record_errors(run, f"{name}.median",
-                  PositionErrors(*np.median(list(errors.values()), axis=0).tolist()), scale,
-                  f"of {len(errors)} trainings, one draw of samples", comparator="info")
-    run.record(f"{name}.spread", max(origins) / min(origins), unit="1", scale=scale,
-               comparator="info", note="the largest error of a training over the smallest")

@@ -148,3 +148,17 @@ def record_errors(run, name, errors, scale, note="", **rule):
     """Record `PositionErrors` in per cent."""
     record_position_errors(run, name, errors, scale, "; ".join(filter(None, (note, ORIGIN))),
                            **rule)
+
+
+def record_seeds(run, name, errors, scale):
+    """Record the `PositionErrors` {net: ..} of trainings of a map, their median, and their spread,
+    the largest over the smallest.
+    """
+    for net, one in errors.items():
+        record_errors(run, f"{name}.{net}", one, scale, comparator="info")
+    origins = [one.origin for one in errors.values()]
+    median = PositionErrors(*np.median(list(errors.values()), axis=0).tolist())
+    record_errors(run, f"{name}.median", median, scale, f"of {len(errors)} trainings",
+                  comparator="info")
+    run.record(f"{name}.spread", max(origins) / min(origins), unit="1", scale=scale,
+               comparator="info", note="the largest error of a training over the smallest")

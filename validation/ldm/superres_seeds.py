@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mpm_ref.rom.study.errors import PositionErrors, Squares
+from mpm_ref.rom.study.errors import Squares
 from mpm_ref.rom.study.full_model import ldm_full_model
 from mpm_ref.rom.study.run import SCHEMES, RunOptions
 from mpm_ref.scene import build
@@ -11,7 +11,7 @@ from mpm_ref.trajectories import history
 from ..common.registry import experiment
 from ..common.scenes import threads_for
 from .networks import SEEDS, trained
-from .references import record_errors
+from .references import record_seeds
 from .studies import TORSION
 from .superres import FINE, REFINE, fine, reduced
 
@@ -34,7 +34,7 @@ def seeds(run):
     errors = {key: errors_of(sums) for key, sums in found.items()}
     scale = f"{FINE} particles, {len(tests)} of {len(TORSION.test)} test runs"
     for name in (one.name for one in options):
-        record_seeds(run, name, {net: errors[net, name] for net in NETS}, scale)
+        record_seeds(run, f"{NAME}.{name}", {net: errors[net, name] for net in NETS}, scale)
     run.table("errors", ("net", "scheme", "origin", "centroid", "displacement"),
               [(*key, *own) for key, own in errors.items()])
 
@@ -61,17 +61,3 @@ def errors_of(sums):
     total = Squares(np.zeros((1, 3)))
     total.sums += sums
     return total.errors
-
-
-def record_seeds(run, name, errors, scale):
-    """Record the `PositionErrors` {net: ..} of a scheme, their median, and their spread, the
-    largest over the smallest.
-    """
-    for net, one in errors.items():
-        record_errors(run, f"{NAME}.{name}.{net}", one, scale, comparator="info")
-    origins = [one.origin for one in errors.values()]
-    record_errors(run, f"{NAME}.{name}.median",
-                  PositionErrors(*np.median(list(errors.values()), axis=0).tolist()), scale,
-                  f"of {len(errors)} trainings", comparator="info")
-    run.record(f"{NAME}.{name}.spread", max(origins) / min(origins), unit="1", scale=scale,
-               comparator="info", note="the largest error of a training over the smallest")

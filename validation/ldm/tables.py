@@ -85,11 +85,8 @@ def compared_models(run, name, tests, nets, draws):
             profiles=("standard",), budget={"standard": 900})
 def in_a_row(run):
     """Errors of ten pokes one after the other, on the map that was trained on single ones."""
-    scene = poked_again(run.rng.uniform(0.0, 2.0 * np.pi, POKED))
-    one = ldm_full_model(scene)
-    with threads_for(one.problem.bodies):
-        x = history(build(scene)).x
-    tests, rows = References(POKES.name, (one,), (x,), 1), []
+    tests, rows = poked_in_a_row(run.rng), []
+    one = tests.cases[0]
     for scheme in run.progress(SCHEMES, "schemes"):
         for points in (POINTS, None):
             options = RunOptions(*scheme, points)
@@ -99,3 +96,11 @@ def in_a_row(run):
     record_errors(run, "ldm.table6.pod", tests.pod_errors(R["poke"], RunOptions()), tests.scale,
                   comparator="info")
     run.table("errors", COLUMNS, rows)
+
+
+def poked_in_a_row(rng):
+    """Return the `References` of pokes one after the other, at POKED random angles."""
+    scene = poked_again(rng.uniform(0.0, 2.0 * np.pi, POKED))
+    one = ldm_full_model(scene)
+    with threads_for(one.problem.bodies):
+        return References(POKES.name, (one,), (history(build(scene)).x,), 1)

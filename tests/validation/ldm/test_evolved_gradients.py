@@ -9,7 +9,7 @@ from mpm_ref.rom.study.errors import PositionErrors
 from validation.common import targets
 from validation.common.verdicts import printed_id
 from validation.ldm import evolved_gradients as experiment
-from validation.ldm.evolved_seeds import record_seeds
+from validation.ldm.references import record_seeds
 
 TESTS = SimpleNamespace(X=np.zeros((7, 3)), scale="runs")
 
