@@ -124,7 +124,7 @@ def moment_errors(boundary_cells, per_cell):
     fine = fine[signed_distance(fine, CYLINDER) <= 0.0]
     masses, centres = [], []
     for map, xhat in states():
-        at, m, _, _, _ = carried(cylinder(boundary_cells, per_cell), map, xhat)
+        at, m, *_ = carried(cylinder(boundary_cells, per_cell), map, xhat)
         masses.append(m.sum() / (RHO * VOLUME) - 1.0)
         centres.append(m @ at.x / m.sum() - map.place(fine, xhat).mean(axis=0))
     return np.sqrt(np.mean(np.square(masses))), np.sqrt(np.mean(np.square(centres)))
@@ -148,7 +148,7 @@ def test_mass_and_centre_of_a_cylinder_are_nearer_than_by_midpoints():
 def test_points_of_cut_cells_lie_in_the_body_and_are_counted():
     map, xhat = decoder(3, 3), np.full(3, -0.5)
     quadrature = cylinder(CUT)
-    at, m, V0, _, said = carried(quadrature, map, xhat)
+    at, m, V0, _, said, _ = carried(quadrature, map, xhat)
     assert signed_distance(at.points, CYLINDER).max() < 0.5 * DX / 2 / LATTICE
     assert m == pytest.approx(RHO * V0)
     J = np.linalg.det(map.derivatives(at.points, xhat)[1])

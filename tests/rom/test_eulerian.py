@@ -216,7 +216,7 @@ def carried(quadrature, map, xhat):
 
 def test_points_outside_the_body_carry_nothing(d, degree):
     (map, xhat), quadrature = bent(d), body(d, degree)
-    at, m, V0, _, said = carried(quadrature, map, xhat)
+    at, m, V0, _, said, _ = carried(quadrature, map, xhat)
     places = quadrature.places(map.place(quadrature.X, xhat))
     X, J = at.points, np.linalg.det(map.derivatives(at.points, xhat)[1])
     assert inside(X).all()
@@ -236,16 +236,16 @@ def test_no_place_in_the_body_is_left_out(d):
     rows = xhat.reshape(d, d + 1)
     A, b = rows[:, :d], rows[:, d]
     origin = (quadrature.places(map.place(quadrature.X, xhat)) - b) @ np.linalg.inv(A).T
-    at, _, _, _, said = carried(quadrature, map, xhat)
-    assert abs(at.points - origin[inside(origin)]).max() < 1e-12
-    assert said["lost"] == 0
+    found = carried(quadrature, map, xhat)
+    assert abs(found.points.points - origin[inside(origin)]).max() < 1e-12
+    assert found.report["lost"] == 0
 
 
 def test_what_cannot_be_traced_back_is_lost():
     """Beyond a fold there are places that no point is mapped to; `cloud` says so."""
     X = 0.2 + 0.2 * cloud(2, 50)
     quadrature = Eulerian(X, RHO, lambda X: np.where(X[:, 0] > 0.0, -1.0, 0.5 * DX), X[:9], DX, 2)
-    at, _, _, _, said = quadrature.cloud(Fold(2), np.zeros(0), np.arange(50))
+    at, _, _, _, said, _ = quadrature.cloud(Fold(2), np.zeros(0), np.arange(50))
     places = quadrature.places(Fold(2).place(X, None))
     assert said["lost"] == (places[:, 0] < 0.0).sum() > 0
     assert said["points"] + said["lost"] == len(places)
@@ -262,7 +262,7 @@ def mass_errors(d, per_cell):
     dx = DX if d == 2 else 1.6 * DX
     volume, area = ((pi * RADIUS**2, 2 * pi * RADIUS) if d == 2 else
                     (4 / 3 * pi * RADIUS**3, 4 * pi * RADIUS**2))
-    off = [carried(body(d, 2, per_cell, dx), *bent(d, k))[1].sum() / (RHO * volume) - 1.0
+    off = [carried(body(d, 2, per_cell, dx), *bent(d, k)).m.sum() / (RHO * volume) - 1.0
            for k in range(4)]
     side = dx / per_cell
     return np.array(off), np.sqrt(area / side ** (d - 1) / 12) * side**d / volume
