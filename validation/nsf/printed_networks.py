@@ -1,5 +1,5 @@
-"""NSF's three networks as printed: widths, encoder, rates and resolution of the paper (NSF-arch,
-NSF-encoder, NSF-train).
+"""NSF's three networks as printed: widths, encoder and rates of the paper (NSF-arch, NSF-encoder,
+NSF-train), on the jelly cube at the printed resolution, on the metal frame and the sand at half.
 
 The paper shows all points of up to 32 snapshots at once, for 300 epochs of the position and 600 of
 the other two networks at each of five rates; it could mean these numbers in total, as is done here.
@@ -22,7 +22,7 @@ from ..common.weights_needed import load_available, load_weights
 from .errors import COLUMNS, error_rows, mean, record_errors, record_mean
 from .networks import FieldsNet, NetworkPlan, identity
 from .networks_runs import DRAWS, TRAINED, fit_to_networks, printed, scale_of
-from .studies import jelly
+from .studies import jelly, metal, sand
 
 FOLDER = Path(__file__).parents[2] / "results" / "training"
 
@@ -32,7 +32,8 @@ EPOCHS = {"g": 300, "h": 600, "l": 600}    # of each network (NSF-train)
 
 def printed_nets():
     """Return {name: `FieldsNet`} of the scenes whose networks are trained as printed."""
-    return {"jelly-printed": as_printed(jelly())}
+    return {f"{name}-printed": as_printed(study) for name, study in (
+        ("jelly", jelly()), ("metal", metal(2)), ("sand", sand(2)))}
 
 
 def as_printed(study):
