@@ -13,13 +13,15 @@ from mpm_ref.executor import BadScheduler, SchedulerLost
 
 from .common import targets
 from .common.cluster_run import run_on_cluster
+from .common.compare import COLUMNS, changes, changes_text, stored_results
 from .common.parallel import run_side_by_side
 from .common.provenance import commit
 from .common.recheck import recheck, sample
+from .common.record import write_whole
 from .common.registry import discover, select
 from .common.report import status_table, write_report
 from .common.results import RESULTS, ROOT, ProfileResults
-from .common.run import RunSetting, run_all
+from .common.run import RunSetting, csv_bytes, run_all
 from .common.standing import (
     disturbed,
     read_markers,
@@ -140,6 +142,30 @@ def recheck_sample(
         for one in found:
             typer.echo(f"  {one.target}: {one.stored} stored, {one.new} now")
     raise typer.Exit(max(_report_broken(catalogue.broken), int(differ)))
+
+
+@app.command()
+def compare(
+        old: Annotated[str, typer.Argument(help="a results folder, or a commit that has one")],
+        new: Annotated[str, typer.Argument(help="likewise")] = str(RESULTS),
+        profile: Profile = "standard",
+        table: Annotated[Path | None, typer.Option(
+            metavar="FILE", help="write the changes as CSV too")] = None):
+    """List verdicts that changed between two sets of records, judged by the rules of today, and
+    numbers that moved by more than their scatter.
+
+    The exit code is 1 where a verdict got worse.
+    """
+    try:
+        with stored_results(old, profile) as before, stored_results(new, profile) as after:
+            found = changes(before, after, targets.load())
+    except ValueError as error:
+        typer.echo(f"{error}", err=True)
+        raise typer.Exit(2) from None
+    typer.echo(changes_text(found))
+    if table:
+        write_whole(table, csv_bytes(COLUMNS, [one.row for one in found]))
+    raise typer.Exit(int(any(one.kind == "worse" for one in found)))
 
 
 def _write_report(folder, profile, printed):

@@ -137,7 +137,7 @@ class Run:
         for row in rows:
             if len(row) != len(columns):
                 raise ValueError(f"table {name}: {len(row)} entries {row} for columns {columns}")
-        self._tables[name] = _csv(columns, rows)
+        self._tables[name] = csv_bytes(columns, rows)
 
     def fail(self, error):
         """Record that the experiment raised; earlier records stay."""
@@ -226,7 +226,8 @@ def _number(value):
     return value, ""
 
 
-def _csv(columns, rows):
+def csv_bytes(columns, rows):
+    """Return a table as the content of a CSV file."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)

@@ -1,0 +1,141 @@
+"""Compare two sets of records: verdicts that changed, and numbers that moved by more than their
+scatter.
+
+Both sets are judged by the rules of today, so that a change of verdict is one of the number.
+"""
+
+import subprocess
+import tarfile
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from .recheck import allowed, relative_difference
+from .results import ROOT, ProfileResults
+from .verdicts import judged
+
+RANK = {"miss": 0, "uncredited": 1, "chosen": 1, "pass": 2, "better": 3}    # of a judged number
+KINDS = ("worse", "improved", "lost", "new", "moved")
+COLUMNS = ("kind", "experiment", "target", "old", "new", "relative", "old_verdict", "new_verdict",
+           "old_commit", "new_commit")
+
+
+class ChangedRecord(NamedTuple):
+    """A number that two sets of records have otherwise; None where a set has none."""
+
+    kind: str               # of KINDS
+    experiment: str
+    target: str
+    values: tuple           # of the old set and the new one
+    relative: float         # |new - old| over the larger; infinite where one of both is missing
+    verdicts: tuple
+    commits: tuple
+
+    @property
+    def row(self):
+        """The row of a table with COLUMNS."""
+        return (self.kind, self.experiment, self.target, *self.values, self.relative,
+                *self.verdicts, *self.commits)
+
+    @property
+    def sentence(self):
+        """The change in a line."""
+        (a, b), (c, d), (e, f) = (tuple("none" if one is None else
+                                        f"{one:.6g}" if isinstance(one, float) else str(one)
+                                        for one in pair)
+                                  for pair in (self.values, self.verdicts, self.commits))
+        verdict = c if c == d else f"{c} -> {d}"
+        return f"{self.target}: {a} -> {b} ({verdict}; {e}..{f})"
+
+
+@contextmanager
+def stored_results(where, profile):
+    """Give the `ProfileResults` of a folder that holds profiles, or those of a commit of the
+    repository. Raises ValueError where it is neither, or has no records of the profile.
+    """
+    with TemporaryDirectory() as scratch:
+        folder = Path(where) if Path(where).is_dir() else results_of_commit(where, profile, scratch)
+        stored = ProfileResults(folder / profile)
+        if not stored.ids():
+            raise ValueError(f"{where} has no records of the profile {profile!r}: expected a "
+                             "folder like results/, or a commit that has some")
+        yield stored
+
+
+def results_of_commit(commit, profile, scratch):
+    """Unpack the records of a commit into a folder `scratch` and return the folder of profiles."""
+    command = ["git", "archive", "--format=tar", commit, f"results/{profile}"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True)
+    if done.returncode:
+        raise ValueError(f"{commit} is neither a folder nor a commit with results/{profile}: "
+                         f"{done.stderr.decode().strip()}")
+    with tarfile.open(fileobj=BytesIO(done.stdout)) as archive:
+        archive.extractall(scratch, filter="data")
+    return Path(scratch) / "results"
+
+
+def changes(old, new, targets):
+    """Return the `ChangedRecord`s of two `ProfileResults`, by kind, those of the largest change
+    first; targets: the `Targets` that judge both.
+    """
+    found = []
+    for experiment in sorted({*old.ids(), *new.ids()}):
+        found += changes_of(experiment, *(records_of(one, experiment) for one in (old, new)),
+                            targets)
+    return sorted(found, key=lambda one: (KINDS.index(one.kind), -one.relative, one.target))
+
+
+def records_of(results, experiment):
+    """Return {target: `Measurement`} of the numbers of an experiment, empty where it has no
+    records.
+    """
+    if experiment not in results.ids():
+        return {}
+    return {record.target: record for record in results.records(experiment)
+            if not is_remark(record)}
+
+
+def is_remark(record):
+    """Return whether a record is a sentence on its experiment; older ones have no word for it."""
+    return record.comparator == "remark" or (record.value is None and not record.unit)
+
+
+def changes_of(experiment, old, new, targets):
+    """Return the `ChangedRecord`s of an experiment from {target: `Measurement`} of both sets."""
+    found = []
+    for target in {*old, *new}:
+        pair = old.get(target), new.get(target)
+        values, verdicts, commits = zip(*(
+            (one.value, judged(one, targets).verdict, one.commit) if one else (None, None, None)
+            for one in pair), strict=True)
+        relative = relative_difference(*values, all(pair))
+        kind = kind_of(verdicts, relative > allowed(pair[1] or pair[0]))
+        if kind:
+            found.append(ChangedRecord(kind, experiment, target, values, relative, verdicts,
+                                       commits))
+    return found
+
+
+def kind_of(verdicts, moved):
+    """Return one of KINDS from the verdicts of the old set and the new one, None where a set has
+    no such number; None where nothing changed.
+    """
+    before, after = verdicts
+    if after is None:
+        return "lost"
+    if before is None:
+        return "new"
+    if before != after and {before, after} <= {*RANK} and RANK[before] != RANK[after]:
+        return "worse" if RANK[after] < RANK[before] else "improved"
+    return "moved" if moved else None
+
+
+def changes_text(found):
+    """Return `ChangedRecord`s as text: for each kind their number, and a line each."""
+    lines = []
+    for kind in KINDS:
+        group = [one for one in found if one.kind == kind]
+        lines += [f"{kind}: {len(group)}", *(f"  {one.sentence}" for one in group)]
+    return "\n".join(lines)
