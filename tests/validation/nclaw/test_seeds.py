@@ -36,3 +36,11 @@ def test_median_of_seeds_stands_beside_the_printed_error(profile, rule):
     assert found == {id: (2e-6, *rule), f"{id}.spread": (pytest.approx(8.0), "info", None)}
     record_task(run, ("water", "velocity"), "admissible", [1e-6, 8e-6])
     assert found[id] == (4.5e-6, "info", None)      # a seed is missing
+
+
+def test_there_is_no_spread_where_a_seed_breaks_down():
+    found = {}
+    run = SimpleNamespace(profile="standard",
+                          record=lambda name, value, **rest: found.update({name: value}))
+    record_task(run, ("water", "velocity"), "ours", [1e-6, float("inf"), 2e-6])
+    assert found == {"nclaw.seeds.ours.water.velocity": 2e-6}
