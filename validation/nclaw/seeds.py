@@ -76,8 +76,8 @@ def laws_by_seed(laws):
 
 def record_task(run, task, method, seed_errors):
     """Record the median of a method's errors over its seeds [m^2] on a task, (environment, task),
-    and the largest over the smallest where no run broke down. The median is judged, by the printed error of the paper's
-    laws, where all seeds are trained.
+    and the largest over the smallest where no run broke down. The median is judged, by the printed
+    error of the paper's laws, where all seeds are trained.
     """
     name, what = task
     table = "nclaw.table1" if what == "reconstruction" else "nclaw.table2"
