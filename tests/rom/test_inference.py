@@ -6,19 +6,26 @@ import numpy as np
 import pytest
 
 from mpm_ref.rom import inference
-from mpm_ref.rom.inference import LatentDynamics, features_of, fit_dynamics, regression
+from mpm_ref.rom.inference import (
+    LatentDynamics,
+    NormalEquations,
+    features_of,
+    fit_dynamics,
+    normal_equations,
+    sizes,
+)
 from mpm_ref.rom.kinematics import NoBody
 
 RUNS, INTERVALS, R, M = 10, 40, 3, 2
 
 
 def true_dynamics():
-    """Damped oscillators with a weak quadratic coupling."""
+    """Damped oscillators that are weakly coupled by products of all kinds."""
     rng = np.random.default_rng(0)
     K = -np.diag([0.1, 0.2, 0.4])
     D, B = -0.3 * np.eye(R), rng.normal(size=(M, R))
-    H = 0.01 * rng.normal(size=(R * (R + 1) // 2, R))
-    return LatentDynamics(np.vstack([K, D, B, H]), 0.0)
+    products = [0.01 * rng.normal(size=(n, R)) for n in (R * (R + 1) // 2, R * R, R * M)]
+    return LatentDynamics(np.vstack([K, D, B, *products]), 0.0)
 
 
 def loads(seed, runs=RUNS):
@@ -34,11 +41,33 @@ def test_a_quadratic_system_is_found_from_its_runs():
     true, u = true_dynamics(), loads(1)
     a = runs_of(true, u)
     assert np.isfinite(a).all()
-    found = LatentDynamics(regression(a, u, 1e-14), 1e-14)
+    found = normal_equations(a, u).solve(1e-14)
     assert abs(found.operators - true.operators).max() < 1e-6
     fresh = loads(2, 3)
     expected = runs_of(true, fresh)
-    assert abs(runs_of(fit_dynamics(a, u), fresh) - expected).max() < 1e-6 * abs(expected).max()
+    fit = fit_dynamics(a, u)
+    assert fit.r == R
+    assert abs(runs_of(fit, fresh) - expected).max() < 1e-6 * abs(expected).max()
+
+
+def test_runs_of_many_loads_are_those_of_each():
+    true, u = true_dynamics(), loads(1)
+    together = np.stack([*true.states(np.moveaxis(u, 1, 0))], axis=1)
+    assert abs(together - runs_of(true, u)).max() < 1e-14
+
+
+def test_coordinates_that_are_noise_are_not_learned():
+    """They stay at rest, and the others are learned without them."""
+    true, u = true_dynamics(), loads(1, 16)
+    a = runs_of(true, u)
+    noise = 1e-4 * np.random.default_rng(6).normal(size=(*a.shape[:2], 4))
+    fit = fit_dynamics(np.concatenate([a, noise], axis=2), u)
+    assert fit.r in (3, 4)
+    assert fit_dynamics(a, u, r=2).r == 2
+
+
+def test_the_numbers_of_coordinates_that_are_tried():
+    assert [sizes(R) for R in (1, 2, 5, 10)] == [(1,), (2,), (2, 4, 5), (2, 4, 6, 8, 10)]
 
 
 def test_a_state_reads_no_load_before_its_interval():
@@ -56,7 +85,8 @@ def test_a_state_reads_no_load_before_its_interval():
 def test_features_are_of_second_order():
     a, before, u = np.array([2.0, 3.0]), np.array([1.0, 5.0]), np.array([7.0])
     found = features_of(a, before, u, np.triu_indices(2))
-    assert found.tolist() == [2.0, 3.0, 1.0, -2.0, 7.0, 4.0, 6.0, 9.0]
+    linear, squares = [2.0, 3.0, 1.0, -2.0, 7.0], [4.0, 6.0, 9.0]
+    assert found.tolist() == [*linear, *squares, 2.0, -4.0, 3.0, -6.0, 14.0, 21.0]
 
 
 def test_noise_asks_for_more_smoothing():
@@ -67,7 +97,8 @@ def test_noise_asks_for_more_smoothing():
 
 
 def test_a_run_that_explodes_is_stopped_with_a_sentence():
-    model = LatentDynamics(np.vstack([9.0 * np.eye(R), np.zeros((R + M + 6, R))]), 0.0)
+    model = LatentDynamics(np.zeros_like(true_dynamics().operators), 0.0)
+    model.operators[:R] = 9.0 * np.eye(R)
     model.operators[R + R] = 1.0
     with pytest.raises(NoBody, match="is the load beyond those of the training runs"):
         [*model.states(np.ones((2000, M)))]
@@ -77,11 +108,12 @@ def test_a_run_that_explodes_is_stopped_with_a_sentence():
     (lambda a, u: (a[0], u), "expected (runs, intervals, r)"),
     (lambda a, u: (a, u[:, 1:]), "expected (runs, intervals, r)"),
     (lambda a, u: (a[:, :1], u[:, :1]), "runs of one interval"),
-    (lambda a, u: (a, u[..., [0, 0]], 1e-18), "too small for features that depend on each other"),
+    (lambda a, u: (a, u[..., [0, 0]], R, 1e-18), "too small for features that depend on each"),
+    (lambda a, u: (a, u, 4), "r = 4: expected 1 to 3"),
     (lambda a, u: (a * np.nan, u), "leave out runs that broke down"),
     (lambda a, u: (0.0 * a, u), "expected runs that move"),
     (lambda a, u: (a[:1], u[:1]), "one training run: expected at least two"),
-    (lambda a, u: (a, u, -1.0), "smoothing = -1.0: expected a positive number")])
+    (lambda a, u: (a, u, None, -1.0), "smoothing = -1.0: expected a positive number")])
 def test_what_is_no_data_is_refused(change, sentence):
     u = loads(1)
     with pytest.raises(ValueError, match=re.escape(sentence)):
@@ -90,21 +122,21 @@ def test_what_is_no_data_is_refused(change, sentence):
 
 def test_a_smoothing_that_is_too_small_is_not_chosen(monkeypatch):
     u = loads(1)
-    a, solve = runs_of(true_dynamics(), u), inference.regression
+    a, solve = runs_of(true_dynamics(), u), NormalEquations.solve
 
-    def some_fail(a, u, smoothing):
+    def some_fail(self, smoothing):
         if smoothing < 1e-5:
             raise inference.NotDefinite
-        return solve(a, u, smoothing)
+        return solve(self, smoothing)
 
     assert fit_dynamics(a, u).smoothing < 1e-5
-    monkeypatch.setattr(inference, "regression", some_fail)
+    monkeypatch.setattr(NormalEquations, "solve", some_fail)
     assert fit_dynamics(a, u).smoothing >= 1e-5
 
 
 def test_runs_that_break_down_with_all_smoothings_are_refused(monkeypatch):
     u = loads(1)
     a = runs_of(true_dynamics(), u)
-    monkeypatch.setattr(inference, "left_out", lambda *given: np.inf)
+    monkeypatch.setattr(inference, "left_out_errors", lambda *given: np.full(11, np.inf))
     with pytest.raises(ValueError, match="expected more runs, or fewer latent coordinates"):
         fit_dynamics(a, u)

@@ -35,8 +35,8 @@ from .reduced import COLUMNS, ArmCost, errors
 COARSER = (1.5, 2.0, 4.0)       # times as coarse
 CORRECTED = (2.0, 4.0)          # ... of the runs that are corrected
 MORE = 30                       # modes of LDM with evolved F
-R_OPERATORS = 6                 # modes of inferred operators,
-LEARNED, LEARNED_SEED = 32, 8   # their training runs, and the seed of these loads
+MOST = 10                       # modes of inferred operators, of which they choose,
+LEARNED, LEARNED_SEED = 64, 8   # their training runs, and the seed of these loads
 REPEATED = 1000                 # runs after which their cost is judged,
 GAIN, WITHIN = 5.0, 0.01        # what they have to gain then, and with which error
 SEED = 1                        # of the loads; settings were chosen on those of seed 0
@@ -55,7 +55,7 @@ BODIES = QUICK | {"400-apic": LiveBody(0.04, 6, "apic"), "13k": LiveBody(0.0125,
 
 
 @experiment("trade.reduced-live", title="Reduced models under loads known while the run goes on",
-            profiles=("quick", "standard"), budget={"quick": 15, "standard": 700})
+            profiles=("quick", "standard"), budget={"quick": 25, "standard": 1000})
 def reduced_live(run):
     """Measure every method at each size; record whether LDM pays."""
     threads = numba.get_num_threads()
@@ -105,7 +105,7 @@ def methods(scenes, gravity, modes):
         yield ldm_method(name, training, count, points=points, deformation_gradient=EVOLVED)
     yield superposition_method(training)
     loads = drawn_loads(gravity, LEARNED, LEARNED_SEED)
-    yield operators_method(load_training(scene, loads), R_OPERATORS)
+    yield operators_method(load_training(scene, loads), MOST)
 
 
 def by_mls(scene):

@@ -100,16 +100,21 @@ def corrected_method(training, coarse, times):
                       training.cpu, coarse.cpu, f"smoothing {fit.smoothing:g}")
 
 
-def operators_method(training, r):
-    """Return the `LiveMethod` of operator inference on r modes of a `LoadTraining`."""
-    clock, (runs, levels, *shape) = process_time(), training.x.shape
-    U, a = directions(training.X, training.x.reshape(-1, *shape), r)
-    model = fit_dynamics(a.reshape(runs, levels, r),
-                         np.repeat(training.loads, training.parts, axis=1))
+def operators_method(training, most):
+    """Return the `LiveMethod` of operator inference of a `LoadTraining`, on at most so many modes
+    of its states after each tick.
+    """
+    X, (runs, levels, *shape) = training.X, training.x.shape
+    clock, ticks = process_time(), training.x[:, training.parts - 1::training.parts]
+    U, _ = directions(X, ticks.reshape(-1, *shape).astype(float), most)
+    to_modes = np.linalg.pinv(U.reshape(-1, most)).T
+    a = np.array([(x - X).reshape(levels, -1) @ to_modes for x in training.x])
+    model = fit_dynamics(a, np.repeat(training.loads, training.parts, axis=1))
+    U = U[..., :model.r]
     return LiveMethod("operators", partial(operator_states, model, training.parts),
-                      lambda a: training.X + U @ a, process_time() - clock, training.cpu,
-                      settings=f"r = {r}, {runs} training runs under random loads, smoothing "
-                      f"{model.smoothing:g}")
+                      lambda a: X + U @ a, process_time() - clock, training.cpu,
+                      settings=f"r = {model.r} of {most}, {runs} training runs under random loads, "
+                      f"smoothing {model.smoothing:g}")
 
 
 def operator_states(model, parts, load):

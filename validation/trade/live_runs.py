@@ -26,7 +26,7 @@ from .arm_models import TimedPositions
 
 STUDY = SCENES.parent / "studies" / "sway.toml"
 TICKS = 18              # of a run
-PARTS = 3               # of a tick, at least, after which `LoadTraining` has states
+PARTS = 6               # of a tick, at least, after which `LoadTraining` has states
 LEVELS = 9              # after as many ticks each, at which states are compared
 HOLD = (2, 6)           # ticks for which gravity stays: from the first on, below the second
 
@@ -59,7 +59,7 @@ class LoadTraining(NamedTuple):
 
     loads: np.ndarray       # (runs, TICKS, 3) [m/s^2]
     X: np.ndarray           # (n, 3) points at rest [m]
-    x: np.ndarray           # (runs, parts * TICKS, n, 3) [m]
+    x: np.ndarray           # (runs, parts * TICKS, n, 3) [m], in single precision: it is large
     cpu: float              # CPU seconds of their steps
 
     @property
@@ -175,17 +175,19 @@ def step_training(scene, gravity):
     return StepTraining(scene, gravity, points_of(scene), x, F, cpu)
 
 
-def load_training(scene, loads):
+def load_training(scene, loads, least=PARTS):
     """Return the `LoadTraining` of runs of a scene under loads (runs, TICKS, 3) [m/s^2], with the
-    fewest parts of a tick that are at least PARTS and divide its steps. Raises ValueError for fewer
-    steps than PARTS in a tick.
+    fewest parts of a tick that are at least `least` and divide its steps. Raises ValueError for
+    fewer steps in a tick.
     """
-    steps, x, cpu = scene.steps // TICKS, [], 0.0
-    if steps < PARTS:
-        raise ValueError(f"{scene.steps} steps: expected at least {PARTS * TICKS}")
-    parts = next(n for n in range(PARTS, steps + 1) if steps % n == 0)
-    for load in loads:
+    steps, X, cpu = scene.steps // TICKS, points_of(scene), 0.0
+    if steps < least:
+        raise ValueError(f"{scene.steps} steps: expected at least {least * TICKS}")
+    parts = next(n for n in range(least, steps + 1) if steps % n == 0)
+    x = np.empty((len(loads), parts * TICKS, *X.shape), np.float32)
+    for one, load in zip(x, loads, strict=True):
         clock, states = process_time(), full_states(scene, load, parts)
-        x.append([field_of(bodies, "x") for bodies in states])
+        for k, bodies in enumerate(states):
+            one[k] = field_of(bodies, "x")
         cpu += process_time() - clock
-    return LoadTraining(loads, points_of(scene), np.array(x), cpu)
+    return LoadTraining(loads, X, x, cpu)

@@ -70,7 +70,7 @@ def methods(scene, training, gravity):
             ldm_method("ldm", training, 6),
             ldm_method("ldm.evolved", training, 6, deformation_gradient="evolved"),
             superposition_method(training),
-            operators_method(load_training(scene, drawn_loads(gravity, 12, 3)), 4))
+            operators_method(load_training(scene, drawn_loads(gravity, 12, 3), 3), 4))
     return {one.name: one for one in made}
 
 
@@ -184,11 +184,11 @@ def test_responses_to_jumps_are_added():
 
 def test_states_of_training_under_loads_are_those_of_the_run(scene, gravity):
     load = drawn_loads(gravity, 1, 3)
-    training = load_training(scene, load)
+    training = load_training(scene, load, 3)
     assert training.parts == 4          # 3 do not divide a tick's steps
     assert training.x.shape == (1, 4 * TICKS, len(training.X), 3)
     assert np.array_equal(training.x[0, 7::8],
-                          played(full_method(scene), load[0]).x)
+                          played(full_method(scene), load[0]).x.astype(np.float32))
 
 
 def test_jumps_have_ages():
@@ -277,5 +277,5 @@ def test_operators_are_compared_over_many_runs_with_their_training(scene):
     assert run.values["x.operators.pays"] == pytest.approx(30.0 / (0.1 - 0.01))
     record_body(run, "x", rows_of(operators=(np.inf, 0.01)), "")
     assert run.values["x.operators.gain"] == 0.0
-    with pytest.raises(ValueError, match="36 steps: expected at least 54"):
+    with pytest.raises(ValueError, match="36 steps: expected at least 108"):
         load_training(with_(scene, steps=36), ())
