@@ -1,0 +1,1 @@
+"""Second implementations, written from the papers alone, and their agreement with the package."""
