@@ -78,7 +78,9 @@ def krylov(A, b):
     """
     D = np.diag(A)
     basis, u, r = np.zeros((len(b), 0)), np.zeros_like(b), b
-    while np.sqrt(r @ (r / D)) > HALF * np.sqrt(b @ (b / D)):
+    for _ in b:
+        if np.sqrt(r @ (r / D)) <= HALF * np.sqrt(b @ (b / D)):
+            break
         basis = np.linalg.qr(np.column_stack([basis, r / D]))[0]
         u = basis @ np.linalg.solve(basis.T @ A @ basis, basis.T @ b)
         r = b - A @ u
