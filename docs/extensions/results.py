@@ -24,9 +24,11 @@ PAPERS = {"hot": ("hot",), "ldm": ("ldm", "ldmw"), "nsf": ("nsf",), "nclaw": ("n
 NAMES = {"hot": "HOT", "ldm": "LDM", "nsf": "NSF", "nclaw": "NCLaw", "explicit": "explicit MPM"}
 OPENINGS = {
     "verification": "Verification, the numbers: analytic and manufactured solutions",
+    "independent": "Second implementations, the numbers: agreement with the package",
     "trade": "Error against cost, the numbers: {}",
     "extremes": "Where methods break, the numbers: {}",
 }
+ONE_PAGE = ("verification", "independent")      # groups whose experiments share a page
 COLUMNS = ("what", "printed; accepted", "measured", "verdict", "scale")
 OWN_COLUMNS = ("what", "expected; accepted", "measured", "verdict", "note")
 PARTS = {           # of a paper's experiment: kinds of its rows
@@ -94,7 +96,7 @@ def shown_parts(section, profile):
     known = declared().get(section.id)
     title = known.title if known else section.id
     if group in OPENINGS:
-        page = group if group == "verification" else f"{group}-{second}"
+        page = group if group in ONE_PAGE else f"{group}-{second}"
         return [Shown(section, "", profile, section.rows, title, page)] if section.rows else []
     paper = next(paper for paper, groups in PAPERS.items() if group in groups)
     by_part = {part: [row for row in section.rows if row.kind in kinds]
