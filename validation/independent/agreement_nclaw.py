@@ -40,8 +40,9 @@ MISSING = "gradients by weights were not compared: PyTorch is not installed"
 
 
 def difference(a, b):
-    """Return the largest |a - b| over the largest |b|; infinite for arrays of other shapes."""
-    return float(np.abs(a - b).max() / np.abs(b).max()) if np.shape(a) == np.shape(b) else np.inf
+    """Return the largest |a - b| over the largest |b|; infinite for other shapes and for NaN."""
+    share = np.abs(a - b).max() / np.abs(b).max() if np.shape(a) == np.shape(b) else np.inf
+    return float(share) if np.isfinite(share) else np.inf
 
 
 def stored(name):
