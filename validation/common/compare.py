@@ -118,9 +118,10 @@ def changes_of(experiment, old, new, targets):
     return found
 
 
-def kind_of(verdicts, moved):
+def kind_of(verdicts, is_different):
     """Return one of KINDS from the verdicts of the old set and the new one, None where a set has
-    no such number; None where nothing changed.
+    no such number, and whether the values differ by more than their scatter; None where nothing
+    changed.
     """
     before, after = verdicts
     if after is None:
@@ -129,13 +130,13 @@ def kind_of(verdicts, moved):
         return "new"
     if before != after and {before, after} <= {*RANK} and RANK[before] != RANK[after]:
         return "worse" if RANK[after] < RANK[before] else "improved"
-    return "moved" if moved else None
+    return "moved" if is_different else None
 
 
-def changes_text(found):
+def changes_text(records):
     """Return `ChangedRecord`s as text: for each kind their number, and a line each."""
     lines = []
     for kind in KINDS:
-        group = [one for one in found if one.kind == kind]
+        group = [one for one in records if one.kind == kind]
         lines += [f"{kind}: {len(group)}", *(f"  {one.sentence}" for one in group)]
     return "\n".join(lines)
