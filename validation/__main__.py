@@ -147,14 +147,17 @@ def recheck_sample(
 @app.command()
 def compare(
         old: Annotated[str, typer.Argument(help="a results folder, or a commit that has one")],
-        new: Annotated[str, typer.Argument(help="likewise")] = str(RESULTS),
+        new: Annotated[str, typer.Argument(
+            help="a results folder, or a commit that has one", show_default="results")]
+        = str(RESULTS),
         profile: Profile = "standard",
         table: Annotated[Path | None, typer.Option(
             metavar="FILE", help="write the changes as CSV too")] = None):
-    """List verdicts that changed between two sets of records, judged by the rules of today, and
-    numbers that moved by more than their scatter.
+    """List verdicts that changed between two sets of records, and numbers that moved by more than
+    their scatter.
 
-    The exit code is 1 where a verdict got worse.
+    Printed numbers are judged by the rules of today, own checks by the rule of the new record. The
+    exit code is 1 where a verdict got worse or an experiment raised; lost numbers do not count.
     """
     try:
         with stored_results(old, profile) as before, stored_results(new, profile) as after:

@@ -1,7 +1,8 @@
 """Compare two sets of records: verdicts that changed, and numbers that moved by more than their
 scatter.
 
-Both sets are judged by the rules of today, so that a change of verdict is one of the number.
+Printed numbers of both sets are judged by the rules of today, and a check of our own by the rule of
+the new set's record, so that a change of verdict is one of the number.
 """
 
 import subprocess
@@ -12,12 +13,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+import msgspec
+
 from .recheck import allowed, relative_difference
 from .results import ROOT, ProfileResults
 from .verdicts import judged
 
 RANK = {"miss": 0, "uncredited": 1, "chosen": 1, "pass": 2, "better": 3}    # of a judged number
-KINDS = ("worse", "improved", "lost", "new", "moved")
+KINDS = ("worse", "improved", "other verdict", "lost", "new", "moved")
 COLUMNS = ("kind", "experiment", "target", "old", "new", "relative", "old_verdict", "new_verdict",
            "old_commit", "new_commit")
 
@@ -66,7 +69,7 @@ def stored_results(where, profile):
 
 def results_of_commit(commit, profile, scratch):
     """Unpack the records of a commit into a folder `scratch` and return the folder of profiles."""
-    command = ["git", "archive", "--format=tar", commit, f"results/{profile}"]
+    command = ["git", "archive", "--format=tar", "--end-of-options", commit, f"results/{profile}"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True)
     if done.returncode:
         raise ValueError(f"{commit} is neither a folder nor a commit with results/{profile}: "
@@ -98,7 +101,11 @@ def records_of(results, experiment):
 
 
 def is_remark(record):
-    """Return whether a record is a sentence on its experiment; older ones have no word for it."""
+    """Return whether a record is a sentence on its experiment, for which older ones have no word of
+    their own; that of an experiment that raised is none.
+    """
+    if record.comparator == "runs":
+        return False
     return record.comparator == "remark" or (record.value is None and not record.unit)
 
 
@@ -108,14 +115,20 @@ def changes_of(experiment, old, new, targets):
     for target in {*old, *new}:
         pair = old.get(target), new.get(target)
         values, verdicts, commits = zip(*(
-            (one.value, judged(one, targets).verdict, one.commit) if one else (None, None, None)
-            for one in pair), strict=True)
+            (one.value, verdict_by(pair[1] or one, one.value, targets), one.commit)
+            if one else (None, None, None) for one in pair), strict=True)
         relative = relative_difference(*values, all(pair))
-        kind = kind_of(verdicts, relative > allowed(pair[1] or pair[0]))
+        failed = pair[1] is not None and pair[1].comparator == "runs"
+        kind = "worse" if failed else kind_of(verdicts, relative > allowed(pair[1] or pair[0]))
         if kind:
             found.append(ChangedRecord(kind, experiment, target, values, relative, verdicts,
                                        commits))
     return found
+
+
+def verdict_by(rule, value, targets):
+    """Return the verdict on a value by the rule of a `Measurement`."""
+    return judged(msgspec.structs.replace(rule, value=value), targets).verdict
 
 
 def kind_of(verdicts, is_different):
@@ -128,9 +141,14 @@ def kind_of(verdicts, is_different):
         return "lost"
     if before is None:
         return "new"
-    if before != after and {before, after} <= {*RANK} and RANK[before] != RANK[after]:
-        return "worse" if RANK[after] < RANK[before] else "improved"
-    return "moved" if is_different else None
+    if before == after:
+        return "moved" if is_different else None
+    if after == "miss":
+        return "worse"
+    rank = RANK.get(after, 0) - RANK.get(before, 0)
+    if "info" in verdicts or rank == 0:
+        return "other verdict"
+    return "improved" if rank > 0 else "worse"
 
 
 def changes_text(records):

@@ -71,8 +71,25 @@ def test_a_number_moves_by_more_than_the_scatter_that_its_record_states(sets):
     assert found(folders) == {}
     write_records(folders[1] / "standard" / "a.json",
                   [record("a.wide", 1.6, comparator="info", bound=None, scatter=0.3),
-                   record("a.time", 2.0, unit="s", comparator="info", bound=None)])
-    assert list(found(folders)) == ["a.wide"]
+                   record("a.time", 2.1, unit="s", comparator="info", bound=None)])
+    assert found(folders).keys() == {"a.wide", "a.time"}
+
+
+def test_an_error_moves_whatever_its_note_says_of_times(sets):
+    note = {"comparator": "info", "bound": None, "note": "a run takes 1 CPU s"}
+    folders = sets({"a": [record("a.x", 1.0, **note)]}, {"a": [record("a.x", 1.1, **note)]})
+    assert list(found(folders)) == ["a.x"]
+
+
+def test_a_check_of_our_own_is_judged_by_its_new_rule(sets):
+    old, new = record("a.x", 0.03), record("a.x", 0.03, bound=0.05)
+    assert found(sets({"a": [old]}, {"a": [new]})) == {}
+
+
+def test_an_experiment_that_raises_is_worse(sets):
+    failed = record("a", None, unit="", comparator="runs", bound=None)
+    changed = found(sets({"a": [record("a.x", 0.01)]}, {"a": [failed]}))
+    assert {name: one.kind for name, one in changed.items()} == {"a": "worse", "a.x": "lost"}
 
 
 def test_a_remark_of_older_records_is_no_number(sets):
@@ -82,8 +99,10 @@ def test_a_remark_of_older_records_is_no_number(sets):
 
 @pytest.mark.parametrize(("verdicts", "moved", "kind"), [
     (("better", "pass"), False, "worse"), (("pass", "chosen"), True, "worse"),
-    (("chosen", "uncredited"), False, None), (("miss", "miss"), True, "moved"),
-    (("info", "miss"), True, "moved"), (("pass", "pass"), False, None),
+    (("chosen", "uncredited"), False, "other verdict"), (("miss", "miss"), True, "moved"),
+    (("info", "miss"), False, "worse"), (("pass", "info"), False, "other verdict"),
+    (("miss", "info"), True, "other verdict"), (("chosen", "pass"), False, "improved"),
+    (("pass", "pass"), False, None),
     ((None, "miss"), True, "new"), (("pass", None), True, "lost")])
 def test_the_kind_of_a_change(verdicts, moved, kind):
     assert kind_of(verdicts, moved) == kind
@@ -91,7 +110,8 @@ def test_the_kind_of_a_change(verdicts, moved, kind):
 
 def test_records_of_a_commit_are_those_of_its_tree(tmp_path, monkeypatch):
     def git(*arguments):
-        return subprocess.run(["git", "-c", "user.name=n", "-c", "user.email=e", *arguments],
+        return subprocess.run(["git", "-c", "user.name=n", "-c", "user.email=e",
+                               "-c", "commit.gpgsign=false", *arguments],
                               cwd=tmp_path, check=True, capture_output=True, text=True).stdout
 
     git("init", "-q")
@@ -134,4 +154,4 @@ def test_the_command_lists_changes_and_its_exit_code_says_whether_one_is_worse(s
 def test_no_change_is_said(sets):
     folders = sets({"a": [record("a.x", 0.01)]}, {"a": [record("a.x", 0.01)]})
     assert changes_text(list(found(folders).values())) == (
-        "worse: 0\nimproved: 0\nlost: 0\nnew: 0\nmoved: 0")
+        "worse: 0\nimproved: 0\nother verdict: 0\nlost: 0\nnew: 0\nmoved: 0")
