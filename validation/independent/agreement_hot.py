@@ -23,6 +23,7 @@ from mpm_ref.scene import problem_from_arrays
 
 from ..common.registry import experiment
 from . import characteristic_norm, galerkin, implicit_step, lbfgs_start, projected_hessian
+from .agreement import difference
 
 DX, DT, RHO0 = 0.1, 0.01, 1000.0
 E, STIFFER, NU = 1e5, 10.0, 0.3
@@ -39,11 +40,6 @@ INEXACT = CycleOptions(coarsest="pcg", preconditioner="scalar")
 IMPLEMENTATIONS = ("blocks", "scipy")           # of multigrid in the package
 STRETCHES = (1e-12, 1e-6, 1e-3, 0.5, 1.0, 2.0)  # lengths of the least stretch, of both signs
 GAPS = (1e-2, 1e-4, 1e-6, 1e-8)                 # sums of the two least stretches
-
-
-def difference(a, b):
-    """Return the largest entry of |a - b| over the largest of |b|."""
-    return float(np.abs(np.asarray(a) - b).max() / np.abs(b).max())
 
 
 def lame(modulus):

@@ -25,6 +25,7 @@ from mpm_ref.trajectories import observed
 from ..common.registry import experiment
 from . import graph_step, learned_run, loss_gradient
 from . import learned_law as plain_law
+from .agreement import difference
 
 if TYPE_CHECKING:       # loaded where PyTorch is needed; its source counts as that of the records
     from mpm_ref.nclaw.train import rollout  # noqa: F401
@@ -37,12 +38,6 @@ DX, DT, GRAVITY, EPS = 0.05, 5e-4, np.array([0.0, -9.8, 0.0]), 1e-7
 WALLS, CLIP = (3, 17), (0.118, 0.975)       # nodes; [m], whose lower side the cube reaches
 WEIGHTS_BOUND = 1e-5                # of gradients by weights: networks train in single precision
 MISSING = "gradients by weights were not compared: PyTorch is not installed"
-
-
-def difference(a, b):
-    """Return the largest |a - b| over the largest |b|; infinite for other shapes and for NaN."""
-    share = np.abs(a - b).max() / np.abs(b).max() if np.shape(a) == np.shape(b) else np.inf
-    return float(share) if np.isfinite(share) else np.inf
 
 
 def stored(name):
@@ -171,8 +166,8 @@ def weight_gradients(name, state, target):
     import torch
 
     neural_laws, observations, rollout = (
-        import_module(f"mpm_ref.nclaw.train.{name}")
-        for name in ("neural_laws", "observations", "rollout"))
+        import_module(f"mpm_ref.nclaw.train.{module}")
+        for module in ("neural_laws", "observations", "rollout"))
     modules = []
     for law in load(WEIGHTS / f"{name}.npz")[:2]:
         modules.append(neural_laws.NeuralLawModule(law.kind))

@@ -32,6 +32,7 @@ from . import (
     nonlinear_projection,
     preimages,
 )
+from .agreement import difference
 
 STEPS, POINTS, FEW = 20, 150, 12        # steps of a run, material points, samples where not all
 BAR = f"""
@@ -73,12 +74,6 @@ LOW, HIGH = np.zeros(3), np.array([0.6, 0.3, 0.3])      # corners of a decoder's
 LAW = FixedCorotated(3e3, 4e3)
 GRAVITY = np.array([1.0, -2.0, -9.8])
 SCALE = f"{POINTS} particles, {STEPS} steps"
-
-
-def difference(a, b):
-    """Return the largest |a - b| over the largest |b|; infinite for other shapes and for NaN."""
-    share = np.abs(a - b).max() / np.abs(b).max() if np.shape(a) == np.shape(b) else np.inf
-    return float(share) if np.isfinite(share) else np.inf
 
 
 def draws(count, seed=0):
