@@ -4,10 +4,10 @@
 
 a = a_k are the coordinates of a body on modes (`pod.directions`) after k intervals of equal length,
 u the load in the interval that begins then, such as gravity, and a x b the products of all
-components of both. The operators follow from training runs by regularised least squares; grid,
-particles and law are not needed, so that a step is a small product of matrices, and nothing holds a
-run to what is physical. It is a rival of the papers' methods, and its training loads must be like
-those of use.
+components of both, each pair once in a x a. The operators follow from training runs by regularised
+least squares; grid, particles and law are not needed, so that a step is a small product of
+matrices, and nothing holds a run to what is physical. It is a rival of the papers' methods, and its
+training loads must be like those of use.
 """
 
 from typing import NamedTuple
@@ -70,15 +70,16 @@ def products(a, b):
     return (a[..., :, None] * b[..., None, :]).reshape(*a.shape[:-1], -1)
 
 
-def fit_dynamics(a, u, r=None, smoothing=None):
+def fit_dynamics(a, u, *, r=None, smoothing=None):
     """Return the `LatentDynamics` of training runs from rest: coordinates a (runs, K, R) after each
     of K intervals, and the loads u (runs, K, m) in them. r: how many coordinates, from the first
     on, are learned; smoothing: lam over the mean square of a scaled feature; None: by `choose`.
 
     Raises ValueError for arrays whose runs or intervals differ, fewer than two intervals, numbers
-    that are not finite, runs without motion, an r that is not from 1 to R, a smoothing that is not
-    positive or too small, and as `choose` does.
+    that are not finite, runs without motion, an r that is no whole number from 1 to R, a smoothing
+    that is not positive or too small, and as `choose` does.
     """
+    a, u = (np.asarray(one, dtype=float) for one in (a, u))
     require_runs(a, u, r, smoothing)
     if r is None or smoothing is None:
         r, smoothing = choose(a, u, sizes(a.shape[2]) if r is None else (r,),
@@ -143,7 +144,7 @@ def choose(a, u, sizes, smoothings):
     best = np.unravel_index(np.argmin(found), found.shape)
     if not np.isfinite(found[best]):
         raise ValueError("learned dynamics break down on training runs that are left out, with all "
-                         "smoothings: expected more runs, or fewer latent coordinates")
+                         f"smoothings and r in {sizes}: expected more runs, or smaller loads")
     return sizes[best[0]], smoothings[best[1]]
 
 
@@ -166,7 +167,8 @@ def left_out_errors(a, u, fold, r, smoothings):
 
 def require_runs(a, u, r, smoothing):
     """Raise ValueError unless coordinates and loads are those of as many intervals of as many runs,
-    finite, with some motion, an r that is given is from 1 to R, and a smoothing positive.
+    finite, with some motion, an r that is given is a whole number from 1 to R, and a smoothing
+    positive.
     """
     if a.ndim != 3 or u.ndim != 3 or a.shape[:2] != u.shape[:2]:
         raise ValueError(f"a {a.shape} and u {u.shape}: expected (runs, intervals, r) and (runs, "
@@ -177,7 +179,8 @@ def require_runs(a, u, r, smoothing):
         raise ValueError("coordinates or loads that are not finite: leave out runs that broke down")
     if not a.any():
         raise ValueError("no coordinate differs from 0: expected runs that move")
-    if r is not None and not 0 < r <= a.shape[2]:
-        raise ValueError(f"r = {r}: expected 1 to {a.shape[2]}, as many as there are coordinates")
+    if r is not None and r not in range(1, a.shape[2] + 1):
+        raise ValueError(f"r = {r}: expected a whole number from 1 to {a.shape[2]}, the number of "
+                         "coordinates")
     if smoothing is not None and not 0.0 < smoothing < np.inf:
         raise ValueError(f"smoothing = {smoothing}: expected a positive number, such as 1e-6")

@@ -57,13 +57,21 @@ def test_runs_of_many_loads_are_those_of_each():
 
 
 def test_coordinates_that_are_noise_are_not_learned():
-    """They stay at rest, and the others are learned without them."""
+    """The first two of four; the others are noise, and taken as 0."""
     true, u = true_dynamics(), loads(1, 16)
-    a = runs_of(true, u)
-    noise = 1e-4 * np.random.default_rng(6).normal(size=(*a.shape[:2], 4))
-    fit = fit_dynamics(np.concatenate([a, noise], axis=2), u)
-    assert fit.r in (3, 4)
+    a = runs_of(true, u)[..., :2]
+    noise = 0.1 * abs(a).max() * np.random.default_rng(6).normal(size=a.shape)
+    assert fit_dynamics(np.concatenate([a, noise], axis=2), u).r == 2
+
+
+def test_coordinates_that_move_are_learned():
+    """Fewer of them leave at least the error of taking the others as 0."""
+    u = loads(1, 16)
+    a = runs_of(true_dynamics(), u)
+    assert fit_dynamics(a, u).r == R
     assert fit_dynamics(a, u, r=2).r == 2
+    errors = inference.left_out_errors(a, u, np.arange(4), 2, (1e-8,))
+    assert errors[0] > np.sum(a[:4, :, 2:] ** 2) > 0.0
 
 
 def test_the_numbers_of_coordinates_that_are_tried():
@@ -109,15 +117,18 @@ def test_a_run_that_explodes_is_stopped_with_a_sentence():
     (lambda a, u: (a, u[:, 1:]), "expected (runs, intervals, r)"),
     (lambda a, u: (a[:, :1], u[:, :1]), "runs of one interval"),
     (lambda a, u: (a, u[..., [0, 0]], R, 1e-18), "too small for features that depend on each"),
-    (lambda a, u: (a, u, 4), "r = 4: expected 1 to 3"),
+    (lambda a, u: (a, u, 4), "r = 4: expected a whole number from 1 to 3"),
+    (lambda a, u: (a, u, 1.5), "r = 1.5: expected a whole number from 1 to 3"),
     (lambda a, u: (a * np.nan, u), "leave out runs that broke down"),
     (lambda a, u: (0.0 * a, u), "expected runs that move"),
     (lambda a, u: (a[:1], u[:1]), "one training run: expected at least two"),
     (lambda a, u: (a, u, None, -1.0), "smoothing = -1.0: expected a positive number")])
 def test_what_is_no_data_is_refused(change, sentence):
     u = loads(1)
+    a, u, *options = change(runs_of(true_dynamics(), u), u)
+    options = dict(zip(("r", "smoothing"), options, strict=False))
     with pytest.raises(ValueError, match=re.escape(sentence)):
-        fit_dynamics(*change(runs_of(true_dynamics(), u), u))
+        fit_dynamics(a, u, **options)
 
 
 def test_a_smoothing_that_is_too_small_is_not_chosen(monkeypatch):
@@ -138,5 +149,5 @@ def test_runs_that_break_down_with_all_smoothings_are_refused(monkeypatch):
     u = loads(1)
     a = runs_of(true_dynamics(), u)
     monkeypatch.setattr(inference, "left_out_errors", lambda *given: np.full(11, np.inf))
-    with pytest.raises(ValueError, match="expected more runs, or fewer latent coordinates"):
+    with pytest.raises(ValueError, match="expected more runs, or smaller loads"):
         fit_dynamics(a, u)
