@@ -1,1 +1,3 @@
-"""Second implementations, written from the papers alone, and their agreement with the package."""
+"""Second implementations, written from the papers and the documentation before the code was read, and
+their agreement with the package.
+"""
