@@ -1,3 +1,4 @@
-"""Second implementations, written from the papers and the documentation before the code was read, and
-their agreement with the package.
+"""Second implementations of parts of the package, and their agreement with it.
+
+They were written from the papers and the documentation, before the package's code was read.
 """
