@@ -1,8 +1,9 @@
 """Run stored experiments again and compare the numbers, each within the scatter that is stated.
 
 A number of the same seed and source is expected to be the same to SAME, which allows for other
-processors; a time, or a ratio of times, to TIMED. A record may state a scatter of its own. Numbers
-under ROUND_OFF are the rounding errors of a processor: any two of them count as the same.
+processors; a time, or a ratio of times, to TIMED; memory to MEMORY. A record may state a scatter of
+its own. Numbers under ROUND_OFF are the rounding errors of a processor: any two of them count as
+the same.
 """
 
 import re
@@ -18,6 +19,7 @@ SAME = 1e-5         # relative
 ROUND_OFF = 1e-12
 TIMED = 0.5         # relative to the larger: a machine that does other work too may take twice
                     # as long
+MEMORY = 0.2        # relative: of a process, with its libraries and caches
 TIME_UNITS = {"s", "us", "h", "CPU s", "s/frame", "s/100 frames", "s/s", "x"}
 TIME_NOTE = re.compile(r"\bCPU\b|\bwall time|\bms a step\b")
 
@@ -79,6 +81,8 @@ def allowed(record):
     """Return the relative scatter of a record's number."""
     if record.scatter is not None:
         return record.scatter
+    if record.unit == "GB":
+        return MEMORY
     return TIMED if is_timed(record) else SAME
 
 

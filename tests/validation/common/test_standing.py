@@ -276,6 +276,8 @@ def measured(value, target=ID, **fields):
     (measured(None), measured(1.0), True),
     (measured(1.0, unit="s"), measured(1.9), False),
     (measured(1.0, unit="s"), measured(2.1), True), (measured(1.0, unit="s"), measured(0.4), True),
+    (measured(1.0, unit="GB"), measured(1.1), False),
+    (measured(1.0, unit="GB"), measured(2.0), True),
     (measured(1.0, unit="1", note="CPU time of a step"), measured(1.9), False),
     (measured(1.0, note="a run takes 1 CPU s"), measured(1.9), True),
     (measured(1.0, note="errors at 31 times"), measured(1.9), True),
