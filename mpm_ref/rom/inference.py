@@ -10,6 +10,7 @@ matrices, and nothing holds a run to what is physical. It is a rival of the pape
 training loads must be like those of use.
 """
 
+from numbers import Integral
 from typing import NamedTuple
 
 import numpy as np
@@ -82,12 +83,12 @@ def fit_dynamics(a, u, *, r=None, smoothing=None):
     a, u = (np.asarray(one, dtype=float) for one in (a, u))
     require_runs(a, u, r, smoothing)
     if r is None or smoothing is None:
-        r, smoothing = choose(a, u, sizes(a.shape[2]) if r is None else (r,),
+        r, smoothing = choose(a, u, numbers_to_try(a.shape[2]) if r is None else (r,),
                               SMOOTHING if smoothing is None else (smoothing,))
     return normal_equations(a[..., :r], u).solve(smoothing)
 
 
-def sizes(R):
+def numbers_to_try(R):
     """Return the numbers of coordinates that `choose` tries, of R: even ones and R."""
     return tuple(sorted({*range(2, R + 1, 2), R}))
 
@@ -131,21 +132,22 @@ def normal_equations(a, u):
         return NormalEquations(A.T @ A, A.T @ y, size, len(F))
 
 
-def choose(a, u, sizes, smoothings):
-    """Return the number of coordinates and the smoothing whose runs of `LatentDynamics` are nearest
-    to the training runs that were left out, a fold of them at a time; coordinates that are not
-    learned stay 0. Raises ValueError for fewer than two runs, and where all break down.
+def choose(a, u, numbers, smoothings):
+    """Return the one of these numbers of coordinates, and of smoothings, whose runs of
+    `LatentDynamics` are nearest to the training runs that were left out, a fold of them at a time;
+    coordinates that are not learned stay 0. Raises ValueError for fewer than two runs, and where
+    all break down.
     """
     if len(a) < 2:
         raise ValueError("one training run: expected at least two, of which some are left out")
     folds = np.array_split(np.arange(len(a)), min(FOLDS, len(a)))
     found = np.array([sum(left_out_errors(a, u, fold, r, smoothings) for fold in folds)
-                      for r in sizes])
+                      for r in numbers])
     best = np.unravel_index(np.argmin(found), found.shape)
     if not np.isfinite(found[best]):
         raise ValueError("learned dynamics break down on training runs that are left out, with all "
-                         f"smoothings and r in {sizes}: expected more runs, or smaller loads")
-    return sizes[best[0]], smoothings[best[1]]
+                         f"smoothings and r in {numbers}: expected more runs, or smaller loads")
+    return numbers[best[0]], smoothings[best[1]]
 
 
 def left_out_errors(a, u, fold, r, smoothings):
@@ -179,7 +181,7 @@ def require_runs(a, u, r, smoothing):
         raise ValueError("coordinates or loads that are not finite: leave out runs that broke down")
     if not a.any():
         raise ValueError("no coordinate differs from 0: expected runs that move")
-    if r is not None and r not in range(1, a.shape[2] + 1):
+    if r is not None and not (isinstance(r, Integral) and 0 < r <= a.shape[2]):
         raise ValueError(f"r = {r}: expected a whole number from 1 to {a.shape[2]}, the number of "
                          "coordinates")
     if smoothing is not None and not 0.0 < smoothing < np.inf:

@@ -12,7 +12,7 @@ from mpm_ref.rom.inference import (
     features_of,
     fit_dynamics,
     normal_equations,
-    sizes,
+    numbers_to_try,
 )
 from mpm_ref.rom.kinematics import NoBody
 
@@ -75,7 +75,7 @@ def test_coordinates_that_move_are_learned():
 
 
 def test_the_numbers_of_coordinates_that_are_tried():
-    assert [sizes(R) for R in (1, 2, 5, 10)] == [(1,), (2,), (2, 4, 5), (2, 4, 6, 8, 10)]
+    assert [numbers_to_try(R) for R in (1, 2, 5, 10)] == [(1,), (2,), (2, 4, 5), (2, 4, 6, 8, 10)]
 
 
 def test_a_state_reads_no_load_before_its_interval():
@@ -119,6 +119,7 @@ def test_a_run_that_explodes_is_stopped_with_a_sentence():
     (lambda a, u: (a, u[..., [0, 0]], R, 1e-18), "too small for features that depend on each"),
     (lambda a, u: (a, u, 4), "r = 4: expected a whole number from 1 to 3"),
     (lambda a, u: (a, u, 1.5), "r = 1.5: expected a whole number from 1 to 3"),
+    (lambda a, u: (a, u, 2.0), "r = 2.0: expected a whole number from 1 to 3"),
     (lambda a, u: (a * np.nan, u), "leave out runs that broke down"),
     (lambda a, u: (0.0 * a, u), "expected runs that move"),
     (lambda a, u: (a[:1], u[:1]), "one training run: expected at least two"),

@@ -70,7 +70,11 @@ def stored_results(where, profile):
 def results_of_commit(commit, profile, scratch):
     """Unpack the records of a commit into a folder `scratch` and return the folder of profiles."""
     command = ["git", "archive", "--format=tar", "--end-of-options", commit, f"results/{profile}"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True)
+    try:
+        done = subprocess.run(command, cwd=ROOT, capture_output=True)
+    except OSError as fault:
+        raise ValueError(f"{commit} is no folder, and git, which has commits, cannot be run: "
+                         f"{fault}") from None
     if done.returncode:
         raise ValueError(f"{commit} is neither a folder nor a commit with results/{profile}: "
                          f"{done.stderr.decode().strip()}")

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 HERE = Path(__file__).parents[1]
 GROUPS = {
     "verification": "Verification: analytic and manufactured solutions, published experiments",
-    "independent": "Independent: second implementations, written from the papers alone",
+    "independent": "Independent: second implementations in plain NumPy and SciPy",
     "trade": "Trade: error against cost",
     "extremes": "Extremes: where each method breaks",
     "hot": "HOT: hierarchical optimization time integration",

@@ -1,4 +1,4 @@
-"""The measure of agreement between the package and a second implementation."""
+"""The measure of agreement between the package and a second implementation, and its records."""
 
 import numpy as np
 
@@ -12,3 +12,12 @@ def difference(a, b, change=None):
         return np.inf
     share = np.abs(a - b).max() / np.abs(b if change is None else change).max()
     return float(share) if np.isfinite(share) else np.inf
+
+
+def record_checks(run, group, checks):
+    """Record the difference of each part of {part: (function that returns it, bound, scale, note)}
+    under the id of a group.
+    """
+    for part, (agreement, bound, scale, note) in checks.items():
+        run.record(f"{group}.{part}", agreement(), comparator="<=", bound=bound, unit="1",
+                   scale=scale, note=note)

@@ -25,7 +25,7 @@ from mpm_ref.trajectories import observed
 from ..common.registry import experiment
 from . import graph_step, learned_run, loss_gradient
 from . import learned_law as plain_law
-from .agreement import difference
+from .agreement import difference, record_checks
 
 if TYPE_CHECKING:       # loaded where PyTorch is needed; its source counts as that of the records
     from mpm_ref.nclaw.train import rollout  # noqa: F401
@@ -246,9 +246,7 @@ CHECKS = {      # name: (agreement, bound, scale, what is compared and how)
             profiles=("quick", "standard"), budget={"quick": 20, "standard": 20})
 def learned_laws(run):
     """Record the largest relative difference of each part of NCLaw from its second version."""
-    for name, (agreement, bound, scale, note) in CHECKS.items():
-        run.record(f"independent.nclaw.{name}", agreement(), comparator="<=", bound=bound, unit="1",
-                   scale=scale, note=note)
+    record_checks(run, "independent.nclaw", CHECKS)
     if find_spec("torch") is None:
         run.note(MISSING)
         return

@@ -32,7 +32,7 @@ from . import (
     nonlinear_projection,
     preimages,
 )
-from .agreement import difference
+from .agreement import difference, record_checks
 
 STEPS, POINTS, FEW = 20, 150, 12        # steps of a run, material points, samples where not all
 BAR = f"""
@@ -271,6 +271,4 @@ CHECKS = {      # name: (agreement, bound, scale, what is compared and how)
             profiles=("quick", "standard"), budget={"quick": 20, "standard": 20})
 def reduced_steps(run):
     """Record the largest relative difference of each reduced part from its second version."""
-    for name, (agreement, bound, scale, note) in CHECKS.items():
-        run.record(f"independent.rom.{name}", agreement(), comparator="<=", bound=bound, unit="1",
-                   scale=scale, note=note)
+    record_checks(run, "independent.rom", CHECKS)

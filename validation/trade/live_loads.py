@@ -35,7 +35,7 @@ from .reduced import COLUMNS, ArmCost, errors
 COARSER = (1.5, 2.0, 4.0)       # times as coarse
 CORRECTED = (2.0, 4.0)          # ... of the runs that are corrected
 MORE = 30                       # modes of LDM with evolved F
-MOST = 10                       # modes of inferred operators, of which they choose,
+MOST = 10                       # modes, of which inferred operators choose,
 LEARNED, LEARNED_SEED = 64, 8   # their training runs, and the seed of these loads
 REPEATED = 1000                 # runs after which their cost is judged,
 GAIN, WITHIN = 5.0, 0.01        # what they have to gain then, and with which error

@@ -101,8 +101,8 @@ def corrected_method(training, coarse, times):
 
 
 def operators_method(training, most):
-    """Return the `LiveMethod` of operator inference of a `LoadTraining`, on at most so many modes
-    of its states after each tick.
+    """Return the `LiveMethod` of operator inference of a `LoadTraining`, on at most `most` modes of
+    its states after each tick.
     """
     X, (runs, levels, *shape) = training.X, training.x.shape
     clock, ticks = process_time(), training.x[:, training.parts - 1::training.parts]

@@ -128,6 +128,13 @@ def test_records_of_a_commit_are_those_of_its_tree(tmp_path, monkeypatch):
         pass
 
 
+def test_without_git_there_are_folders_alone(monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(ValueError, match="git, which has commits, cannot be run"), \
+            stored_results("HEAD", "standard"):
+        pass
+
+
 def test_a_folder_without_records_is_refused(tmp_path):
     with (pytest.raises(ValueError, match=r"has no records of the profile 'paper'"),
           stored_results(tmp_path, "paper")):

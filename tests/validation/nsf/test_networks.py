@@ -228,6 +228,7 @@ def test_networks_have_the_ids_of_the_printed_errors(name, id):
 def test_networks_as_printed_have_the_widths_epochs_and_rates_of_the_paper(scene, widths):
     """By hand from Table 1 and appendix E, with the epochs of all rates together."""
     net = as_printed.printed_nets()[f"{scene}-printed"]
+    assert net.study.coarser == (1 if scene == "jelly" else 2)
     assert [(own.width, own.epochs, own.jitter) for own in (net.g, net.h, net.l)] == list(
         zip(widths, (300, 600, 600), (0.0, 0.0, 0.0), strict=True))
     assert (net.batch, net.latent, net.schedule) == (32, "encoder-nsf", "steps")
