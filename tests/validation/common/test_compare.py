@@ -62,6 +62,12 @@ def test_changes_have_their_kinds_in_order_and_what_stayed_is_left_out(sets):
     assert worse.sentence == "a.worse: 0.01 -> 0.03 (pass -> miss; aaa..bbb)"
 
 
+def test_the_largest_changes_stand_first(sets):
+    old = {"a": [record(f"a.{name}", 0.01) for name in "bcd"]}
+    new = {"a": [record("a.b", 0.011), record("a.c", 0.015), record("a.d", 0.012)]}
+    assert list(found(sets(old, new))) == ["a.c", "a.d", "a.b"]
+
+
 def test_a_number_moves_by_more_than_the_scatter_that_its_record_states(sets):
     old = {"a": [record("a.wide", 1.0, comparator="info", bound=None),
                  record("a.time", 1.0, unit="s", comparator="info", bound=None)]}

@@ -5,10 +5,12 @@ recorded of them.
 import numpy as np
 import pytest
 
+from mpm_ref.rom.fields.pod import directions
 from mpm_ref.rom.study.full_model import field_of
 from mpm_ref.scene import build
 from mpm_ref.simulate import simulate
 from validation.common.scenes import with_
+from validation.trade import live_models
 from validation.trade.arm_models import TimedPositions
 from validation.trade.live_loads import REPEATED, measured, record_body
 from validation.trade.live_models import (
@@ -189,6 +191,19 @@ def test_states_of_training_under_loads_are_those_of_the_run(scene, gravity):
     assert training.x.shape == (1, 4 * TICKS, len(training.X), 3)
     assert np.array_equal(training.x[0, 7::8],
                           played(full_method(scene), load[0]).x.astype(np.float32))
+
+
+def test_modes_of_operators_are_of_the_states_after_each_tick(scene, gravity, monkeypatch):
+    training, snapshots = load_training(scene, drawn_loads(gravity, 6, 3), 3), []
+
+    def recorded(X, x, r):
+        snapshots.append(x)
+        return directions(X, x, r)
+
+    monkeypatch.setattr(live_models, "directions", recorded)
+    operators_method(training, 2)
+    ends = training.x[:, 3::4].reshape(-1, *training.X.shape)
+    assert np.array_equal(snapshots[0], ends.astype(float))
 
 
 def test_jumps_have_ages():
