@@ -13,7 +13,8 @@ from .judge import interval_of, judge_printed, verdict_in
 VARIANTS = {        # words behind the id of a printed number
     "modes": "fields of modes in place of the paper's networks",
     "weighted": "samples with weights by cubature in place of random ones",
-    "plain": "networks without Fourier features",
+    "plain": "narrower networks than the paper's, on coordinates of modes",
+    "waves": "networks as with `plain`, two of which read sines and cosines of places",
     "positions": "a map that is trained on positions alone, without F and v",
     "repaired": "as the text describes the method; the printed number is of the authors' release, "
                 "which has faults",

@@ -91,17 +91,18 @@ def scale_of(net, one):
 
 
 def printed_error(name, target):
-    """Return the id of the printed error of networks with features; of those without, with a word
+    """Return the id of the printed error of networks as printed; of narrower ones, with a word
     behind it; of other seeds and widths, an id of our own.
     """
     scene, _, kind = name.partition("-")
     printed = f"nsf.{scene}.{PRINTED.get(scene, 'error')}"
-    return {"waves": printed, "": f"{printed}.plain"}.get(kind, target)
+    words = {"printed": "", "waves": ".waves", "": ".plain"}
+    return printed + words[kind] if kind in words else target
 
 
 def own_rule(name):
     """Return the rule of the error of networks that no printed number stands for."""
-    return {} if name.partition("-")[2] in ("", "waves") else {"comparator": "info"}
+    return {} if name.partition("-")[2] in ("printed", "waves", "") else {"comparator": "info"}
 
 
 def record_scene(run, name, one, scale):

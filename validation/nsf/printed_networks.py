@@ -21,7 +21,7 @@ from ..common.registry import experiment
 from ..common.weights_needed import load_available, load_weights
 from .errors import COLUMNS, error_rows, mean, record_errors, record_mean
 from .networks import FieldsNet, NetworkPlan, identity
-from .networks_runs import DRAWS, TRAINED, fit_to_networks, printed, scale_of
+from .networks_runs import DRAWS, TRAINED, fit_to_networks, printed, printed_error, scale_of
 from .studies import jelly, metal, sand
 
 FOLDER = Path(__file__).parents[2] / "results" / "training"
@@ -79,7 +79,8 @@ def record_runs(run, name, one, scale):
     target, few = f"nsf.networks-printed.{name}", one.study.samples
     rows = [row for draw in run.progress(range(DRAWS), f"{name}, {few} samples")
             for row in error_rows(one, name, few, (draw,))]
-    record_mean(run, target, rows, scale, f"{few} samples", **TRAINED)
+    record_mean(run, printed_error(name, target), rows, scale, f"{few} samples",
+                fields=TRAINED["fields"])
     run.record(f"{target}.stress", 100.0 * mean(rows, "stress"), unit="%", comparator="info",
                scale=scale, note="of the Kirchhoff stress, all particles and times")
     nearest = [one.nearest_state_errors(value) for value in one.study.test]

@@ -215,9 +215,11 @@ def test_weights_of_samples_are_those_of_modes_of_the_same_runs(folder):
 
 
 @pytest.mark.parametrize(("name", "id"), [
-    ("jelly-waves", "nsf.jelly.error"), ("metal-waves", "nsf.metal.error.50"),
+    ("jelly-printed", "nsf.jelly.error"), ("metal-printed", "nsf.metal.error.50"),
+    ("jelly-waves", "nsf.jelly.error.waves"), ("metal-waves", "nsf.metal.error.50.waves"),
     ("jelly", "nsf.jelly.error.plain"), ("metal", "nsf.metal.error.50.plain"),
-    ("toothpaste-waves", "nsf.toothpaste.error.50"), ("jelly-seed-1", "nsf.networks.jelly-seed-1")])
+    ("toothpaste-waves", "nsf.toothpaste.error.50.waves"),
+    ("jelly-seed-1", "nsf.networks.jelly-seed-1")])
 def test_networks_have_the_ids_of_the_printed_errors(name, id):
     assert runs.printed_error(name, f"nsf.networks.{name}") == id
     assert (runs.own_rule(name) == {}) is ("networks" not in id)
@@ -244,7 +246,7 @@ def test_errors_of_networks_as_printed_are_those_of_their_runs(folder, monkeypat
     assert run_all([as_printed.networks_as_printed.experiment], setting) == []
     found = {r.target.removeprefix("nsf.networks-printed.jelly-printed"): r.value
              for r in ProfileResults(folder / "out").records("nsf.networks-printed")}
-    assert found[""] == pytest.approx(2.0)                  # mean of 1, 2, 3 %
+    assert found["nsf.jelly.error"] == pytest.approx(2.0)                  # mean of 1, 2, 3 %
     assert found[".stress"] == pytest.approx(20.0)
     assert found[".nearest"] == pytest.approx(0.1)
     assert found[".fit.displacement"] == pytest.approx(4.0)
@@ -254,4 +256,5 @@ def test_every_scene_has_the_id_of_a_printed_error():
     printed = targets.load()
     names = [name for name in kept.nets() if name.endswith("-waves")]
     assert len(names) == 7
-    assert all(runs.printed_error(name, "") in printed for name in names)
+    assert all(runs.printed_error(name, "").removesuffix(".waves") in printed for name in names)
+    assert all(runs.printed_error(name, "") in printed for name in as_printed.printed_nets())
