@@ -16,7 +16,7 @@ from validation.common.registry import GROUPS, discover
 from validation.common.report import chapters
 from validation.common.results import RESULTS, ProfileResults
 
-from . import atlas, mutation_page, paper_figures, settings, verdict_pages, which_model
+from . import atlas, change_page, mutation_page, paper_figures, settings, verdict_pages, which_model
 from .markdown import cell, grid_table
 
 FOLDER = "results/numbers"
@@ -66,8 +66,8 @@ def pages():
     result |= paper_figures.pages(printed, rows, images())
     result |= atlas.pages(shown_experiments())
     standard = ProfileResults(RESULTS / "standard")
-    return (result | mutation_page.pages() | settings.pages(standard)
-            | which_model.pages(standard))
+    return (result | change_page.pages() | mutation_page.pages()
+            | settings.pages(standard) | which_model.pages(standard))
 
 
 @cache

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from validation.common import change_table
 from validation.common.citations import ROOT, documentation, exists
 from validation.common.targets import load
 from validation.common.verdicts import VARIANTS
@@ -201,3 +202,12 @@ def test_links_to_numbers_lead_to_places_that_exist(result_pages):
     places = re.findall(r"^\((numbers[^)]*)\)=", text, re.MULTILINE)
     assert len(places) == len(set(places))
     assert set(re.findall(r"\(#(numbers[^)]*)\)", text)) <= set(places)
+
+
+def test_the_page_of_changes_has_the_reason_of_each_worse_verdict(result_pages):
+    page = result_pages["results/generated/changes.md"]
+    row, = [line for line in page.splitlines() if "`ldm.fig16.realtime`" in line]
+    assert "| pass → miss | Before, options that the paper does not have were judged" in row
+    assert page.count("→ miss | ") == sum(
+        one.kind == "worse" and one.verdicts[1] == "miss" for one in change_table.read())
+    assert "| not known |" not in page
