@@ -14,6 +14,7 @@ from mpm_ref.executor import BadScheduler, SchedulerLost
 from .common import targets
 from .common.cluster_run import run_on_cluster
 from .common.compare import COLUMNS, changes, changes_text, stored_results
+from .common.durations import durations
 from .common.parallel import run_side_by_side
 from .common.provenance import commit
 from .common.recheck import recheck, sample
@@ -53,14 +54,16 @@ Ids = Annotated[list[str] | None, typer.Argument(help="ids or their leading part
 
 
 @app.command("list")
-def list_experiments(profile: Profile = "quick"):
-    """All experiments and the seconds that each is expected to take at one profile."""
+def list_experiments(profile: Profile = "quick", results: Folder = RESULTS):
+    """All experiments and the seconds that each is expected to take at one profile, and all."""
     catalogue = discover()
     typer.echo(f"{'experiment':<44} {profile:>10}  title")
     for e in catalogue.experiments.values():
         cost = f"{e.seconds(profile):.0f} s" if profile in e.profiles else "—"
         typer.echo(f"{e.id:<44} {cost:>10}  {e.title}")
     typer.echo(f"—: does not run at the {profile} profile; --profile shows another one")
+    stored = ProfileResults(results / profile)
+    typer.echo(durations(catalogue.experiments.values(), stored, profile).sentence)
     raise typer.Exit(_report_broken(catalogue.broken))
 
 

@@ -270,14 +270,15 @@ def invoke(tmp_path, monkeypatch):
     return lambda *words: CliRunner().invoke(cli.app, [*words])
 
 
-def test_list(invoke):
+def test_list(invoke, tmp_path):
     for profile, cost in (("quick", ["1", "s"]), ("paper", ["—", "A"])):
-        said = invoke("list", "--profile", profile)
+        said = invoke("list", "--profile", profile, "--results", str(tmp_path))
         assert said.exit_code == 0
-        header, toy, _, last = map(str.split, said.output.splitlines())
+        header, toy, _, others, last = map(str.split, said.output.splitlines())
         assert header == ["experiment", profile, "title"]
         assert toy[:3] == ["verification.sound", *cost]
-        assert last[0] == "—:"
+        assert others[0] == "—:"
+        assert last[:2] == [{"quick": "2", "paper": "0"}[profile], "experiments,"]
 
 
 def test_run_writes_results_and_report(invoke, tmp_path):

@@ -1,0 +1,39 @@
+"""How long experiments take: what was expected of them, and what those that ran have taken."""
+
+from typing import NamedTuple
+
+HOUR = 3600.0   # [s]
+
+
+class Durations(NamedTuple):
+    """Times of the experiments of a profile."""
+
+    count: int          # of experiments
+    expected: float     # wall time one after the other, from their budgets [s]
+    stored: int         # of those that have records
+    cpu: float          # time of these on all their threads [s]
+    wall: float         # the same by the clock, other work included [s]
+
+    @property
+    def sentence(self):
+        """The times in words."""
+        text = f"{self.count} experiments, {hours(self.expected)} expected one after the other"
+        if not self.stored:
+            return text
+        return (f"{text}; the {self.stored} that have records took {hours(self.cpu)} of CPU time, "
+                f"{hours(self.wall)} by the clock")
+
+
+def hours(seconds):
+    """Return a time in words."""
+    return f"{seconds / HOUR:.1f} h" if seconds >= HOUR else f"{seconds / 60.0:.1f} min"
+
+
+def durations(experiments, stored, profile):
+    """Return the `Durations` of experiments that run at a profile; stored: its
+    `ProfileResults`.
+    """
+    own = [e for e in experiments if profile in e.profiles]
+    first = [stored.records(e.id)[0] for e in own if e.id in stored.ids()]
+    return Durations(len(own), sum(e.seconds(profile) for e in own), len(first),
+                     sum(one.cpu_seconds for one in first), sum(one.seconds for one in first))
