@@ -1,4 +1,4 @@
-"""How long experiments take: what was expected of them, and what those that ran have taken."""
+"""Times of a whole profile: what its experiments should take, and what those that ran have taken."""
 
 from typing import NamedTuple
 
