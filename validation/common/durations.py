@@ -1,4 +1,4 @@
-"""Times of a whole profile: what its experiments should take, and what those that ran have taken."""
+"""Times of a whole profile: what its experiments should take, and what those that ran took."""
 
 from typing import NamedTuple
 
