@@ -27,6 +27,7 @@ from ..timestep import TimeStep, stable_dt
 from . import law_info, rom_info
 from .catalogue import find_scene, is_hdf5, study_named
 from .errors import at_start, exit_on_errors, options
+from .study_kinds import is_law_study, is_study
 from .terminal import as_json, compiling, warn
 
 
@@ -242,10 +243,10 @@ def _facts_of_npz_or_text(name):
         if is_npz(name):
             return of_npz(name)
         study = study_named(name)
-        if rom_info.is_study(study):
+        if is_study(study):
             facts = rom_info.of_study(name)
             return facts, rom_info.study_lines(facts)
-        if law_info.is_law_study(study):
+        if is_law_study(study):
             facts = law_info.law_study_facts(study)
             return facts, law_info.law_study_lines(facts)
         layers = law_info.read_json_layers(Path(name))

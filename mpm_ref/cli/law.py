@@ -1,4 +1,4 @@
-"""Implement `mpm-ref law train | evaluate | export | plot`: laws learned from motion.
+"""Implement `mpm-ref law studies | train | evaluate | export | plot`: laws learned from motion.
 
 A study file names the scene, the method and its recipe (docs/reference/studies.md). `law_train` has
 the command `train`.
@@ -18,7 +18,7 @@ from ..nclaw.study.compare import RunBroken, compare_runs, write_errors
 from ..nclaw.study.curves import compare_curves, draw_curves, paths_for, write_curves
 from ..store.atomic import require_place
 from ..store.text import counted
-from . import law_train
+from . import law_info, law_train
 from .errors import UNSTABLE, end, exit_on_errors, options, writing
 from .options import (
     NUMBERS,
@@ -37,7 +37,10 @@ from .options import (
 from .terminal import as_json, passing, tell, warn
 
 app = typer.Typer(no_args_is_help=True, help="Train laws on the motion of a scene, compare them "
-                  "with the true ones, and export them to other programs.")
+                  "with the true ones, and export them to other programs.",
+                  epilog="`mpm-ref law studies` lists the bundled law studies; "
+                  "docs/reference/studies.md explains how to write one.")
+app.command()(law_info.studies)
 app.command()(law_train.train)
 
 

@@ -1,4 +1,6 @@
-"""`mpm-ref info` of learned laws, their exported layers, graph networks and law studies."""
+"""`mpm-ref info` of learned laws, their exported layers, graph networks and law studies, and
+`mpm-ref law studies`.
+"""
 
 import json
 from dataclasses import asdict
@@ -11,13 +13,15 @@ from ..materials.learned.weights import PARTS, dim_of
 from ..nclaw import export
 from ..nclaw.gnn import weights as gnn_weights
 from ..nclaw.study.study import SYS_ID, load
-from ..scene import SceneError
 from ..scene.toml import read_tables
 from ..store.text import counted
 from ..store.weights_file import read_provenance, require_format
 from . import provenance
-from .catalogue import bundled_scenes
-from .options import OF_ERRORS, horizons, training_error_text
+from .catalogue import bundled_scenes, bundled_studies
+from .errors import exit_on_errors
+from .options import OF_ERRORS, Json, horizons, training_error_text
+from .study_kinds import is_study
+from .terminal import print_titles
 
 LAYERS = "mpm_ref law"          # what the format of layers begins with
 AFTER = ".elastic_kind"         # what follows the epoch in such a file
@@ -196,15 +200,11 @@ def error_text(error):
     return "inf" if error is None else f"{error:.3g}"
 
 
-OWN = {"scene", "method", "laws", "train"}      # keys that no scene has
-
-
-def is_law_study(path):
-    """Return whether a file is a law study, even one with invalid tables."""
-    try:
-        return bool(OWN & set(read_tables(path)))
-    except SceneError:
-        return False
+def studies(json: Json = False):
+    """List the bundled law studies."""
+    with exit_on_errors():
+        print_titles({name: read_tables(path)["title"] for name, path in bundled_studies().items()
+                      if not is_study(path)}, json)
 
 
 def law_study_facts(path):

@@ -31,6 +31,7 @@ from .options import (
     require_free,
     training_error_text,
 )
+from .study_kinds import require_laws
 from .terminal import passing, warn
 
 SAID = 10           # lines about a training where there is no terminal
@@ -62,7 +63,9 @@ def train(
     """
     with exit_on_errors():
         with options():
-            study = load(find_study(name), bundled_scenes())
+            path = find_study(name)
+            require_laws(name, path)
+            study = load(path, bundled_scenes())
             out = out or study.file("weights") or Path(f"{study.path.stem}.npz")
             require_start(study, out, seeds)
         if seeds > 1:

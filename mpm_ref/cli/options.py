@@ -18,6 +18,7 @@ from ..scene import SceneError
 from ..store.atomic import NotWritten
 from .catalogue import bundled_scenes, find_scene, find_study
 from .errors import INTERRUPT, end, exit_on_errors
+from .study_kinds import require_reduced
 from .terminal import warn
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
@@ -127,8 +128,10 @@ def examples(*commands):
 
 
 def load_study(name):
-    """Return the `Study` of a file or of a bundled name."""
-    return load(find_study(name), bundled_scenes())
+    """Return the `Study` of a file or of a bundled name. Raises SceneError."""
+    path = find_study(name)
+    require_reduced(name, path)
+    return load(path, bundled_scenes())
 
 
 @contextmanager

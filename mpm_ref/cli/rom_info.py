@@ -10,34 +10,25 @@ from ..rom.fields.polynomial_manifold import Curved
 from ..rom.study.record import supported_model
 from ..rom.study.study_file import parse_tables
 from ..rom.study.tables import CURVED, MODES, NETWORK, NSF
-from ..scene import SceneError
 from ..scene.toml import read_tables
 from ..store.text import counted
 from .catalogue import bundled_studies
 from .errors import exit_on_errors
 from .options import Json, load_study
+from .study_kinds import is_study
 from .terminal import print_titles
 
-TABLES = {"parameter", "map"}       # of a study of reduced runs; nothing else has such
 TERMS = ("position", "F", "velocity")       # of the loss of a network
 MEASURES = {"origin": "of the distance from the scene's origin",
             "centroid": "from the body's centroid", "displacement": "of the displacement"}
 
 
 def studies(json: Json = False):
-    """List the bundled studies."""
+    """List the bundled studies of reduced models."""
     with exit_on_errors():
         print_titles({name: parse_tables(read_tables(path)).title for name,
                       path in bundled_studies().items()
                 if is_study(path)}, json)
-
-
-def is_study(path):
-    """Return whether a file is a study of reduced runs, even one with invalid tables."""
-    try:
-        return bool(TABLES & set(read_tables(path)))
-    except SceneError:
-        return False
 
 
 def of_study(name):

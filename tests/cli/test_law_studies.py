@@ -155,9 +155,20 @@ def test_a_checkpoint_takes_no_other_file_s_place(tmp_path, checkpoint, words):
     assert sorted(file.name for file in tmp_path.iterdir()) == ["cube.toml", "cubes.toml"]
 
 
-def test_studies_of_reduced_models_are_refused():
-    assert_told(mpm_ref("law", "train", "gravity_small"), 2, "gravity_small.toml: ", "unknown key")
-
-
 def test_a_study_that_does_not_exist_is_told_with_those_that_do():
     assert_told(mpm_ref("law", "train", "none"), 2, "nor a bundled study", "law_jelly")
+
+
+def test_the_bundled_law_studies_are_listed():
+    lines = mpm_ref("law", "studies").stdout.splitlines()
+    assert [line.split()[0] for line in lines] == ["law_jelly", "law_jelly_small",
+                                                   "law_plasticine"]
+    assert lines[1].endswith(" NCLaw: jelly, small")
+
+
+def test_a_study_of_the_other_kind_is_refused_with_its_command():
+    assert_told(mpm_ref("law", "train", "gravity_small"), 2, "gravity_small: a study of reduced "
+                "models; `mpm-ref rom generate gravity_small` makes its runs")
+    for command in ("generate", "train", "run", "evaluate", "play"):
+        assert_told(mpm_ref("rom", command, "law_jelly_small"), 2, "law_jelly_small: a law study; "
+                    "`mpm-ref law train law_jelly_small` trains it")

@@ -79,7 +79,7 @@ def python(unpacked, folder, *arguments):
 def test_the_installed_command_line_finds_its_scenes_and_studies(unpacked, tmp_path):
     file = python(unpacked, tmp_path, "-c", "import mpm_ref; print(mpm_ref.__file__)")
     assert Path(file.strip()) == unpacked / "mpm_ref" / "__init__.py"
-    for command, pattern in (("scenes", "scenes/*.toml"), ("rom studies", "studies/[!l]*.toml")):
+    for command, pattern in (("scenes", "scenes/*.toml"), ("law studies", "studies/law_*.toml")):
         lines = python(unpacked, tmp_path, "-m", "mpm_ref", *command.split()).splitlines()
         assert {line.split()[0] for line in lines} == {path.stem for path in ROOT.glob(pattern)}
 

@@ -9,7 +9,7 @@ class Durations(NamedTuple):
     """Times of the experiments of a profile."""
 
     count: int          # of experiments
-    expected: float     # wall time one after the other, from their budgets [s]
+    budget: float       # wall time that they may take, one after the other [s]
     stored: int         # of those that have records
     cpu: float          # time of these on all their threads [s]
     wall: float         # the same by the clock, other work included [s]
@@ -17,7 +17,7 @@ class Durations(NamedTuple):
     @property
     def sentence(self):
         """The times in words."""
-        text = f"{self.count} experiments, {hours(self.expected)} expected one after the other"
+        text = f"{self.count} experiments with budgets of {hours(self.budget)} in all"
         if not self.stored:
             return text
         return (f"{text}; the {self.stored} that have records took {hours(self.cpu)} of CPU time, "

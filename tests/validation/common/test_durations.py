@@ -22,8 +22,8 @@ def test_times_are_those_of_the_experiments_of_the_profile():
             Experiment("a.d", "", ("quick",), {}, None)]
     found = durations(toys, Stored(), "standard")
     assert found == Durations(2, 700.0, 1, 90.0, 60.0)
-    assert found.sentence == ("2 experiments, 11.7 min expected one after the other; the 1 that "
-                              "have records took 1.5 min of CPU time, 1.0 min by the clock")
+    assert found.sentence == ("2 experiments with budgets of 11.7 min in all; the 1 that have "
+                              "records took 1.5 min of CPU time, 1.0 min by the clock")
 
 
 def test_long_times_are_in_hours():
@@ -32,4 +32,4 @@ def test_long_times_are_in_hours():
 
 def test_without_records_the_times_are_those_expected():
     found = Durations(198, 3600.0, 0, 0.0, 0.0)
-    assert found.sentence == "198 experiments, 1.0 h expected one after the other"
+    assert found.sentence == "198 experiments with budgets of 1.0 h in all"

@@ -278,7 +278,7 @@ def test_list(invoke, tmp_path):
         assert header == ["experiment", profile, "title"]
         assert toy[:3] == ["verification.sound", *cost]
         assert others[0] == "—:"
-        assert last[:2] == [{"quick": "2", "paper": "0"}[profile], "experiments,"]
+        assert last[:2] == [{"quick": "2", "paper": "0"}[profile], "experiments"]
 
 
 def test_run_writes_results_and_report(invoke, tmp_path):
