@@ -92,9 +92,15 @@ def departure_line(row, first, other):
         f"{R['largest']:.1e} (step {R['step']}, particle {R['particle']}), {R['median']:.1e}")
     backend = f"{BACKENDS[row['backend']]} {row['precision']}"
     backend += " adjoint" if row["kind"] == "adjoint" else ""
-    after = "" if other is None else f"{worst(other):.2g} ({' and '.join(other['replaced'])})"
+    after = "" if other is None else f"{worst(other):.2g} ({replaced_parts(other)})"
     return (f"| {row['case']} | {backend} | {place} | {numbers[0]} | {numbers[1]} | {rotations} "
             f"| {after} |")
+
+
+def replaced_parts(row):
+    """Return the names of the parts that are replaced in a row; a fluid has no decomposition."""
+    return " and ".join(part for part in row["replaced"]
+                        if part != "svd" or row["svd"] != "none")
 
 
 def worst(row):
@@ -107,7 +113,7 @@ def report_line(row):
     state = "agrees" if row["agrees"] else f"departs in {row['departures']} of {row['arrays']}"
     first = "" if row["first"] is None else (
         f", first at {row['first']['stage']}, {row['first']['array']}")
-    replaced = f" ({' and '.join(row['replaced'])} replaced)" if row["replaced"] else ""
+    replaced = f" ({replaced_parts(row)} replaced)" if replaced_parts(row) else ""
     return (f"{row['kind']:8}{row['case']:22} {row['backend']:7}{row['precision']}{replaced} "
             f"{state}{first}; largest difference {worst(row):.2g} of its "
             "tolerance")
