@@ -1,8 +1,8 @@
 """Run the benchmarks: `python -m benchmarks COMMAND`.
 
-They compare mpm_ref with Taichi and Warp on an elastic block, forward and with a gradient, measure
-the cost of each feature and of an implicit step, time a sweep on several workers, and simulate
-many workers.
+They compare mpm_ref with Taichi and Warp on an elastic block, forward and with a gradient, check
+steps of both against golden files, measure the cost of each feature and of an implicit step, time
+a sweep on several workers, and simulate many workers.
 """
 
 import json
@@ -93,7 +93,7 @@ def show(row):
     )
 
 
-def save(out, rows, threads, repeats):
+def save(out, rows, threads, repeats, **conditions):
     """Write the rows with the conditions of the measurement."""
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps({
@@ -101,7 +101,7 @@ def save(out, rows, threads, repeats):
         "commit": commit(Path(__file__).parents[1]),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": platform.machine(), "cpu": cpu_model(), "cores": os.cpu_count(),
-        "threads": threads, "repeats": repeats, "rows": rows,
+        "threads": threads, "repeats": repeats, **conditions, "rows": rows,
     }, indent=1) + "\n")
     typer.echo(f"wrote {out}")
 
@@ -134,6 +134,24 @@ def gradients(
             rows.append({"size": size} | row)
             typer.echo(gradient_line(rows[-1]))
     save(out, rows, threads, repeats)
+
+
+@app.command()
+def conformance(
+    backends: Annotated[str, typer.Option()] = "taichi,warp",
+    out: Annotated[Path, typer.Option()] = Path("results/benchmarks/conformance.json"),
+):
+    """Check steps of Taichi and Warp, and gradients of Warp's tape, stage by stage."""
+    from .conformance import conformance_rows, versions
+    from .conformance_table import adjoint_table, departure_lines, report_line, stage_table
+
+    names, rows = backends.split(","), []
+    for row in conformance_rows(names):
+        rows.append(row)
+        typer.echo(report_line(row))
+    for lines in (stage_table(rows), adjoint_table(rows), departure_lines(rows)):
+        typer.echo("\n" + "\n".join(lines))
+    save(out, rows, 1, 1, versions=versions(names))
 
 
 @app.command()
