@@ -55,7 +55,9 @@ Ids = Annotated[list[str] | None, typer.Argument(help="ids or their leading part
 
 @app.command("list")
 def list_experiments(profile: Profile = "quick", results: Folder = RESULTS):
-    """All experiments and the seconds that each is expected to take at one profile, and all."""
+    """All experiments, the seconds that each is expected to take at one profile, and the time of
+    the whole.
+    """
     catalogue = discover()
     typer.echo(f"{'experiment':<44} {profile:>10}  title")
     for e in catalogue.experiments.values():
