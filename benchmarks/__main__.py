@@ -142,10 +142,15 @@ def conformance(
     out: Annotated[Path, typer.Option()] = Path("results/benchmarks/conformance.json"),
 ):
     """Check steps of Taichi and Warp, and gradients of Warp's tape, stage by stage."""
-    from .conformance import conformance_rows, versions
+    from .conformance import conformance_rows, require_installed, versions
     from .conformance_table import adjoint_table, departure_lines, report_line, stage_table
 
     names, rows = backends.split(","), []
+    try:
+        require_installed(names)
+    except ValueError as error:
+        typer.echo(f"{error}", err=True)
+        raise typer.Exit(2) from None
     for row in conformance_rows(names):
         rows.append(row)
         typer.echo(report_line(row))

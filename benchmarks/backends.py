@@ -33,21 +33,24 @@ def serve(pipe, name, problem, threads):
 
 
 class RemoteBackend:
-    """A backend in a process of its own, which answers there as `serve` does."""
+    """A backend in a process of its own, which answers there as `serve` does.
 
-    def __init__(self, name, problem, threads, serve=serve):
+    setup: what `serve` takes beside the name and the number of threads: a problem or a precision.
+    """
+
+    def __init__(self, name, setup, threads, serve=serve):
         context = get_context("spawn")
         self.pipe, end = context.Pipe()
-        self.process = context.Process(target=serve, args=(end, name, problem, threads),
+        self.process = context.Process(target=serve, args=(end, name, setup, threads),
                                        daemon=True)
         self.process.start()
         end.close()
 
-    def run(self, count):
-        """Return the answer to a number: of `serve` the wall and CPU seconds of that many steps,
-        and the kinetic energy after them [J].
+    def run(self, task):
+        """Return the answer of `serve` to a task. The default `serve` takes a number of steps, and
+        answers with their wall and CPU seconds, and the kinetic energy after them [J].
         """
-        self.pipe.send(count)
+        self.pipe.send(task)
         return self.pipe.recv()
 
     def close(self):

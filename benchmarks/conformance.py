@@ -10,6 +10,7 @@ What still departs is checked once more without nodes that have hardly any mass.
 
 from dataclasses import asdict
 from importlib.metadata import version
+from importlib.util import find_spec
 from tempfile import TemporaryDirectory
 
 import h5py
@@ -32,7 +33,19 @@ from .conformance_cases import (
 
 PRECISIONS = ("f64", "f32")
 MASS_FLOOR = 1e-13      # of the heaviest node, below which a node is left out
+CHECKS = ("library", ()), ("double", ("svd",)), ("double", ("svd", "nodes"))
+FLUID_CHECKS = ("library", ()), ("library", ("nodes",))     # a fluid has no decomposition
 PACKAGES = {"taichi": "taichi", "warp": "warp-lang"}
+
+
+def require_installed(names):
+    """Raise ValueError for a backend that is unknown or not installed."""
+    for name in names:
+        if name not in PACKAGES:
+            raise ValueError(f"--backends {name}: unknown; expected some of {', '.join(PACKAGES)}")
+        if find_spec(name) is None:
+            raise ValueError(f"--backends {name}: it is not installed; "
+                             "pip install -c constraints.txt -e '.[bench]'")
 
 
 def versions(names):
@@ -90,10 +103,10 @@ def step_rows(case, golden, name_and_precision, backend):
     the same without nodes that are lighter than `MASS_FLOOR`.
     """
     start, is_fluid = read_start(golden), case.material == "fluid"
-    answers = {"library": backend.run((start, "library"))}
-    for svd, replaced in (("library", ()), ("double", ("svd",)), ("double", ("svd", "nodes"))):
+    answers = {}
+    for svd, replaced in FLUID_CHECKS if is_fluid else CHECKS:
         if svd not in answers:
-            answers[svd] = answers["library"] if is_fluid else backend.run((start, svd))
+            answers[svd] = backend.run((start, svd))
         steps = [stages for stages, _ in answers[svd]]
         if "nodes" in replaced:
             steps = [without_light_nodes(stages) for stages in steps]
@@ -152,13 +165,19 @@ def exact_arrays(golden):
     with h5py.File(golden) as g:
         return sorted({name for step in g["steps"].values()
                        for array, name in golden_arrays(step, stage_arrays("explicit"), ["body"])
-                       if (step[f"scale/{name}"][()] == 0.0).any()})
+                       if (tolerance_floor(step, name) == 0.0).any()})
+
+
+def tolerance_floor(step, name):
+    """Return what the tolerance of an array is made of: 0 where it is 0."""
+    scale = step[f"scale/{name}"][()]
+    return scale + step[f"bar/{name}"][()] if f"bar/{name}" in step else scale
 
 
 def stage_errors(golden, other, precision):
     """Return {stage: its largest difference in units of the tolerance, with the array and step}.
 
-    The number is None where the tolerance is 0 and the difference is not.
+    Where an array departs without such a number, it is None, and "what" says why.
     """
     worst = {}
     with h5py.File(golden) as g, h5py.File(other) as o:
@@ -167,21 +186,25 @@ def stage_errors(golden, other, precision):
             theirs = given_arrays(o[f"steps/{step}"], bodies)
             for array, name in golden_arrays(g[f"steps/{step}"], stage_arrays("explicit"), bodies):
                 if name in theirs:
-                    units = in_tolerances(
+                    units, what = largest_difference(
                         *compare_array(g[f"steps/{step}"], theirs, array, name, precision))
                     if units >= worst.get(array.stage, (0.0,))[0]:
-                        worst[array.stage] = units, name, int(step)
-    return {stage: {"units": None if np.isinf(units) else units, "array": name, "step": step}
-            for stage, (units, name, step) in worst.items()}
+                        worst[array.stage] = units, what, name, int(step)
+    return {stage: {"units": None if what else units, "what": what, "array": name, "step": step}
+            for stage, (units, what, name, step) in worst.items()}
 
 
-def in_tolerances(departure, units):
-    """Return the difference over the tolerance of an array, infinite where it has no number."""
+def largest_difference(departure, units):
+    """Return the difference of an array over its tolerance, infinite where it has no number, and
+    then why. departure, units: as `compare_array` returns them.
+    """
     if departure is None:
-        return float(units)
-    if not departure.get("tolerance"):
-        return np.inf
-    return departure["difference"] / departure["tolerance"]
+        return float(units), ""
+    if "what" in departure:
+        return np.inf, departure["what"]
+    if departure["tolerance"] == 0.0:
+        return np.inf, "tolerance 0"
+    return departure["difference"] / departure["tolerance"], ""
 
 
 def rotation_errors(answers):

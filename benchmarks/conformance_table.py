@@ -45,17 +45,17 @@ def table_lines(heads, columns, arrays):
 
 def cell(stage, rows):
     """Return the largest error of a stage in rows, with the case; "" where none has the stage."""
-    entries = [(size(row["stages"][stage]["units"]), row["case"]) for row in rows
-               if stage in row["stages"]]
+    entries = [(size(row["stages"][stage]["units"]), row["case"], row["stages"][stage]["what"])
+               for row in rows if stage in row["stages"]]
     if not entries:
         return ""
-    units, case = max(entries)
-    text = "tolerance 0" if units == float("inf") else f"{units:.2g}"
+    units, case, what = max(entries)
+    text = what or f"{units:.2g}"
     return f"**{text}**, {case}" if units > 1.0 else f"{text}, {case}"
 
 
 def size(units):
-    """Return a number of the record, infinite where it is None: the tolerance is 0."""
+    """Return a number of the record, infinite where there is none."""
     return float("inf") if units is None else units
 
 
@@ -92,15 +92,9 @@ def departure_line(row, first, other):
         f"{R['largest']:.1e} (step {R['step']}, particle {R['particle']}), {R['median']:.1e}")
     backend = f"{BACKENDS[row['backend']]} {row['precision']}"
     backend += " adjoint" if row["kind"] == "adjoint" else ""
-    after = "" if other is None else f"{worst(other):.2g} ({replaced_parts(other)})"
+    after = "" if other is None else f"{worst(other):.2g} ({' and '.join(other['replaced'])})"
     return (f"| {row['case']} | {backend} | {place} | {numbers[0]} | {numbers[1]} | {rotations} "
             f"| {after} |")
-
-
-def replaced_parts(row):
-    """Return the names of the parts that are replaced in a row; a fluid has no decomposition."""
-    return " and ".join(part for part in row["replaced"]
-                        if part != "svd" or row["svd"] != "none")
 
 
 def worst(row):
@@ -113,7 +107,7 @@ def report_line(row):
     state = "agrees" if row["agrees"] else f"departs in {row['departures']} of {row['arrays']}"
     first = "" if row["first"] is None else (
         f", first at {row['first']['stage']}, {row['first']['array']}")
-    replaced = f" ({replaced_parts(row)} replaced)" if replaced_parts(row) else ""
+    replaced = f" ({' and '.join(row['replaced'])} replaced)" if row["replaced"] else ""
     return (f"{row['kind']:8}{row['case']:22} {row['backend']:7}{row['precision']}{replaced} "
             f"{state}{first}; largest difference {worst(row):.2g} of its "
             "tolerance")

@@ -65,7 +65,11 @@ def list_experiments(profile: Profile = "quick", results: Folder = RESULTS):
         typer.echo(f"{e.id:<44} {cost:>10}  {e.title}")
     typer.echo(f"—: does not run at the {profile} profile; --profile shows another one")
     stored = ProfileResults(results / profile)
-    typer.echo(durations(catalogue.experiments.values(), stored, profile).sentence)
+    try:
+        typer.echo(durations(catalogue.experiments.values(), stored, profile).sentence)
+    except ValueError as damaged:
+        typer.echo(f"{damaged}", err=True)
+        raise typer.Exit(2) from None
     raise typer.Exit(_report_broken(catalogue.broken))
 
 

@@ -14,6 +14,7 @@ WORDS = {
     "lost": "numbers that are no longer recorded", "new": "new numbers",
 }
 LISTED = "worse", "improved", "other verdict"
+SIDES = {"lost": 0, "new": 1}       # which of a record's two verdicts there is
 
 
 def pages():
@@ -25,13 +26,21 @@ def lines(records, reasons):
     """Yield the counts, and the tables of changed verdicts, from `ChangedRecord`s."""
     counts = Counter(one.kind for one in records)
     yield f"Since commit `{reasons.old}`:\n"
-    yield from grid_table(("number", "of"), ([str(counts[kind]), text]
+    yield from grid_table(("number", "of"), ([str(counts[kind]), text + by_verdict(records, kind)]
                                              for kind, text in WORDS.items()))
     for kind in LISTED:
         group = [one for one in records if one.kind == kind]
         if group:
             yield f"**{WORDS[kind].capitalize()}**\n"
             yield from grid_table(*table(kind, group, reasons))
+
+
+def by_verdict(records, kind):
+    """Return how many records of a kind have which verdict, as text; "" where they have two."""
+    if kind not in SIDES:
+        return ""
+    counts = Counter(one.verdicts[SIDES[kind]] for one in records if one.kind == kind)
+    return f": {', '.join(f'{n} {verdict}' for verdict, n in counts.most_common())}"
 
 
 def table(kind, group, reasons):
@@ -47,4 +56,5 @@ def table(kind, group, reasons):
 def cells(record):
     """Return the cells of a record."""
     values = ("none" if value is None else f"{value:.3g}" for value in record.values)
-    return [f"`{record.target}`", *values, " → ".join(record.verdicts)]
+    verdicts = (verdict or "none" for verdict in record.verdicts)
+    return [f"`{record.target}`", *values, " → ".join(verdicts)]

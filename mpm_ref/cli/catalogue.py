@@ -7,7 +7,8 @@ from ..scene import SceneError
 from ..store.checksums import has_head
 
 HDF5 = b"\x89HDF\r\n\x1a\n"      # how such files begin, but for results
-LISTS = {"scenes": "scenes", "studies": "rom studies"}      # commands
+LISTS = {"scenes": "scenes", "studies of reduced models": "rom studies",      # commands
+         "studies of laws": "law studies"}
 LONGEST = 100                    # characters of a name that are compared with others
 SCENES = (".toml", ".json")      # suffixes of their files
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -53,14 +54,17 @@ def find_scene(name):
                      f"{_meant(name, scenes, 'scenes')}")
 
 
-def find_study(name):
-    """Return the path of a study, given by its file or a bundled name. Raises SceneError."""
+def find_study(name, kind, is_kind):
+    """Return the path of a study, given by its file or a bundled name. Raises SceneError, which
+    names the studies of a kind: a key of LISTS, and whether a path is one.
+    """
     if Path(name).is_file():
         return Path(name)
     studies = bundled_studies()
     if name not in studies:
+        others = {other: path for other, path in studies.items() if is_kind(path)}
         raise SceneError(f"{name}: there is no such file, nor a bundled study of that name; "
-                         f"{_meant(name, studies, 'studies')}")
+                         f"{_meant(name, others, kind)}")
     return studies[name]
 
 

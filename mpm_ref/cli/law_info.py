@@ -20,7 +20,7 @@ from . import provenance
 from .catalogue import bundled_scenes, bundled_studies
 from .errors import exit_on_errors
 from .options import OF_ERRORS, Json, horizons, training_error_text
-from .study_kinds import is_study
+from .study_kinds import is_law_study
 from .terminal import print_titles
 
 LAYERS = "mpm_ref law"          # what the format of layers begins with
@@ -203,8 +203,8 @@ def error_text(error):
 def studies(json: Json = False):
     """List the bundled law studies."""
     with exit_on_errors():
-        print_titles({name: read_tables(path)["title"] for name, path in bundled_studies().items()
-                      if not is_study(path)}, json)
+        print_titles({name: read_tables(path).get("title", "")
+                      for name, path in bundled_studies().items() if is_law_study(path)}, json)
 
 
 def law_study_facts(path):

@@ -14,7 +14,7 @@ from ..nclaw.study.study import load
 from ..store.atomic import require_place
 from ..store.text import counted
 from . import provenance
-from .catalogue import bundled_scenes, find_study, require_other_file
+from .catalogue import bundled_scenes, require_other_file
 from .errors import UNSTABLE, at_start, end, exit_on_errors, options, writing
 from .law_motion import motion
 from .law_seeds import SeedOptions, train_seeds
@@ -31,7 +31,7 @@ from .options import (
     require_free,
     training_error_text,
 )
-from .study_kinds import require_laws
+from .study_kinds import find_law_study
 from .terminal import passing, warn
 
 SAID = 10           # lines about a training where there is no terminal
@@ -63,9 +63,7 @@ def train(
     """
     with exit_on_errors():
         with options():
-            path = find_study(name)
-            require_laws(name, path)
-            study = load(path, bundled_scenes())
+            study = load(find_law_study(name), bundled_scenes())
             out = out or study.file("weights") or Path(f"{study.path.stem}.npz")
             require_start(study, out, seeds)
         if seeds > 1:

@@ -16,9 +16,9 @@ from ..rom.study.generate import one_thread
 from ..rom.study.study import load
 from ..scene import SceneError
 from ..store.atomic import NotWritten
-from .catalogue import bundled_scenes, find_scene, find_study
+from .catalogue import bundled_scenes, find_scene
 from .errors import INTERRUPT, end, exit_on_errors
-from .study_kinds import require_reduced
+from .study_kinds import find_reduced_study
 from .terminal import warn
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
@@ -129,9 +129,7 @@ def examples(*commands):
 
 def load_study(name):
     """Return the `Study` of a file or of a bundled name. Raises SceneError."""
-    path = find_study(name)
-    require_reduced(name, path)
-    return load(path, bundled_scenes())
+    return load(find_reduced_study(name), bundled_scenes())
 
 
 @contextmanager

@@ -57,7 +57,7 @@ BROKE = "broke down"
 
 app = typer.Typer(no_args_is_help=True, help="Train a reduced model on many runs of a scene, then "
                   "run it with a few numbers instead of particles.",
-                  epilog="`mpm-ref rom studies` lists the bundled studies; "
+                  epilog="`mpm-ref rom studies` lists the bundled studies of reduced models; "
                   "docs/reference/studies.md explains how to write one.")
 app.command(epilog=examples("studies"))(rom_info.studies)
 app.command("generate", epilog=examples(

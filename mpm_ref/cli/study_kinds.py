@@ -2,6 +2,7 @@
 
 from ..scene import SceneError
 from ..scene.toml import read_tables
+from .catalogue import find_study
 
 REDUCED = {"parameter", "map"}          # keys of a study of reduced models alone
 LAWS = {"method", "laws", "train"}      # keys of a law study alone
@@ -14,7 +15,7 @@ def is_study(path):
 
 def is_law_study(path):
     """Return whether a file is a law study, even one with invalid tables."""
-    return bool((LAWS | {"scene"}) & keys_of(path))
+    return not is_study(path) and bool((LAWS | {"scene"}) & keys_of(path))
 
 
 def keys_of(path):
@@ -25,15 +26,23 @@ def keys_of(path):
         return set()
 
 
-def require_reduced(name, path):
-    """Raise SceneError where the study of a name is a law study."""
+def find_reduced_study(name):
+    """Return the path of a study of reduced models, given by its file or a bundled name. Raises
+    SceneError, also for a law study.
+    """
+    path = find_study(name, "studies of reduced models", is_study)
     if LAWS & keys_of(path) and not is_study(path):
         raise SceneError(f"{name}: a law study; `mpm-ref law train {name}` trains it, and "
                          "`mpm-ref rom studies` lists those of reduced models")
+    return path
 
 
-def require_laws(name, path):
-    """Raise SceneError where the study of a name is one of reduced models."""
+def find_law_study(name):
+    """Return the path of a law study, given by its file or a bundled name. Raises SceneError, also
+    for one of reduced models.
+    """
+    path = find_study(name, "studies of laws", is_law_study)
     if is_study(path) and not LAWS & keys_of(path):
         raise SceneError(f"{name}: a study of reduced models; `mpm-ref rom generate {name}` makes "
                          "its runs, and `mpm-ref law studies` lists those of laws")
+    return path

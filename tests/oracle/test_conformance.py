@@ -7,8 +7,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from benchmarks import conformance
+from benchmarks.__main__ import app
 from benchmarks.backends import RemoteBackend
 from benchmarks.conformance import PACKAGES, PRECISIONS, checked_row, record_case, serve_stages
 from benchmarks.conformance_cases import (
@@ -125,7 +127,29 @@ def test_a_difference_where_the_tolerance_is_0_has_no_number(tmp_path):
         step = f["steps/0"]
         given = {"nodes": step["nodes"][()], "momentum": step["momentum"][()] + 1e-12}
     row = checked_row(path, [given], "f64")
-    assert row["stages"] == {"p2g": {"units": None, "array": "momentum", "step": 0}}
+    assert row["stages"] == {"p2g": {"units": None, "what": "tolerance 0", "array": "momentum",
+                                     "step": 0}}
+
+
+def test_arrays_without_numbers_to_compare_say_why(golden, arrays):
+    arrays[0]["C"][3, 0, 1] = np.nan
+    arrays[0]["tau"] = arrays[0]["tau"][:-1]
+    stages = checked_row(golden, arrays, "f64")["stages"]
+    assert stages["g2p"]["units"] is stages["stress"]["units"] is None
+    assert stages["g2p"]["what"].endswith("is not finite")
+    assert "46" in stages["stress"]["what"]
+
+
+@pytest.mark.parametrize(("name", "fault"), [
+    ("warp ", "warp : unknown; expected some of taichi, warp"),
+    ("absent", "absent: it is not installed; pip install")])
+def test_a_backend_that_cannot_run_is_refused(name, fault, monkeypatch, tmp_path):
+    monkeypatch.setitem(PACKAGES, "absent", "absent")
+    out = tmp_path / "a.json"
+    said = CliRunner().invoke(app, ["conformance", "--backends", name, "--out", str(out)])
+    assert said.exit_code == 2
+    assert fault in " ".join(said.output.split())
+    assert not out.exists()
 
 
 def test_rotation_errors_name_the_worst_particle():
@@ -209,7 +233,8 @@ def row_of(units, case="2D MLS jelly", **fields):
     return {"kind": "steps", "case": case, "backend": "taichi", "precision": "f64",
             "svd": "library", "replaced": [], "agrees": units is not None and units <= 1.0,
             "arrays": 42, "departures": 3, "first": None,
-            "stages": {"p2g": {"units": units, "array": "mass", "step": 0}}} | fields
+            "stages": {"p2g": {"units": units, "what": "tolerance 0" if units is None else "",
+                               "array": "mass", "step": 0}}} | fields
 
 
 def test_a_cell_has_the_worst_case_and_departures_are_bold():

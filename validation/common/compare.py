@@ -20,6 +20,7 @@ from .results import ROOT, ProfileResults
 from .verdicts import judged
 
 RANK = {"miss": 0, "uncredited": 1, "chosen": 1, "pass": 2, "better": 3}    # of a judged number
+UNJUDGED = ("info", "chosen", "uncredited")     # verdicts that are no improvement of a miss
 KINDS = ("worse", "improved", "other verdict", "lost", "new", "moved")
 COLUMNS = ("kind", "experiment", "target", "old", "new", "relative", "old_verdict", "new_verdict",
            "old_commit", "new_commit")
@@ -85,23 +86,20 @@ def results_of_commit(commit, profile, scratch):
 
 def changes(old, new, targets):
     """Return the `ChangedRecord`s of two `ProfileResults`, by kind, those of the largest change
-    first; targets: the `Targets` that judge both.
+    first; targets: the `Targets` that judge both. A number that another experiment records now is
+    the same number.
     """
-    found = []
-    for experiment in sorted({*old.ids(), *new.ids()}):
-        found += changes_of(experiment, *(records_of(one, experiment) for one in (old, new)),
-                            targets)
-    return sorted(found, key=lambda one: (KINDS.index(one.kind), -one.relative, one.target))
+    old, new = numbers_of(old), numbers_of(new)
+    found = (changed_record(target, (old.get(target), new.get(target)), targets)
+             for target in {*old, *new})
+    return sorted((one for one in found if one),
+                  key=lambda one: (KINDS.index(one.kind), -one.relative, one.target))
 
 
-def records_of(results, experiment):
-    """Return {target: `Measurement`} of the numbers of an experiment, empty where it has no
-    records.
-    """
-    if experiment not in results.ids():
-        return {}
-    return {record.target: record for record in results.records(experiment)
-            if not is_remark(record)}
+def numbers_of(results):
+    """Return {target: (experiment, `Measurement`)} of all numbers of a set of records."""
+    return {record.target: (experiment, record) for experiment in results.ids()
+            for record in results.records(experiment) if not is_remark(record)}
 
 
 def is_remark(record):
@@ -113,21 +111,20 @@ def is_remark(record):
     return record.comparator == "remark" or (record.value is None and not record.unit)
 
 
-def changes_of(experiment, old, new, targets):
-    """Return the `ChangedRecord`s of an experiment from {target: `Measurement`} of both sets."""
-    found = []
-    for target in {*old, *new}:
-        pair = old.get(target), new.get(target)
-        values, verdicts, commits = zip(*(
-            (one.value, verdict_by(pair[1] or one, one.value, targets), one.commit)
-            if one else (None, None, None) for one in pair), strict=True)
-        relative = relative_difference(*values, all(pair))
-        failed = pair[1] is not None and pair[1].comparator == "runs"
-        kind = "worse" if failed else kind_of(verdicts, relative > allowed(pair[1] or pair[0]))
-        if kind:
-            found.append(ChangedRecord(kind, experiment, target, values, relative, verdicts,
-                                       commits))
-    return found
+def changed_record(target, pair, targets):
+    """Return the `ChangedRecord` of a number from (experiment, `Measurement`) of both sets, None
+    where a set has none; None where nothing changed.
+    """
+    experiments, records = zip(*(one or (None, None) for one in pair), strict=True)
+    rule = records[1] or records[0]
+    values, verdicts, commits = zip(*(
+        (one.value, verdict_by(rule, one.value, targets), one.commit) if one else (None, None, None)
+        for one in records), strict=True)
+    relative = relative_difference(*values, all(records))
+    failed = records[1] is not None and records[1].comparator == "runs"
+    kind = "worse" if failed else kind_of(verdicts, relative > allowed(rule))
+    return kind and ChangedRecord(kind, experiments[1] or experiments[0], target, values, relative,
+                                  verdicts, commits)
 
 
 def verdict_by(rule, value, targets):
@@ -150,7 +147,7 @@ def kind_of(verdicts, is_different):
     if after == "miss":
         return "worse"
     rank = RANK.get(after, 0) - RANK.get(before, 0)
-    if "info" in verdicts or rank == 0:
+    if "info" in verdicts or rank == 0 or (rank > 0 and after in UNJUDGED):
         return "other verdict"
     return "improved" if rank > 0 else "worse"
 

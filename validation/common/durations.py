@@ -26,7 +26,8 @@ class Durations(NamedTuple):
 
 def hours(seconds):
     """Return a time in words."""
-    return f"{seconds / HOUR:.1f} h" if seconds >= HOUR else f"{seconds / 60.0:.1f} min"
+    minutes = round(seconds / 60.0, 1)
+    return f"{seconds / HOUR:.1f} h" if minutes >= 60.0 else f"{minutes:.1f} min"
 
 
 def durations(experiments, stored, profile):
@@ -34,6 +35,7 @@ def durations(experiments, stored, profile):
     `ProfileResults`.
     """
     own = [e for e in experiments if profile in e.profiles]
-    first = [stored.records(e.id)[0] for e in own if e.id in stored.ids()]
+    ids = set(stored.ids())
+    first = [stored.records(e.id)[0] for e in own if e.id in ids]
     return Durations(len(own), sum(e.seconds(profile) for e in own), len(first),
                      sum(one.cpu_seconds for one in first), sum(one.seconds for one in first))

@@ -69,10 +69,13 @@ def encoded(records):
 def read_records(path):
     """Read the records of a file. Raises ValueError with the file and the wrong field."""
     try:
-        return msgspec.json.decode(Path(path).read_bytes(), type=list[Measurement])
+        records = msgspec.json.decode(Path(path).read_bytes(), type=list[Measurement])
     except msgspec.DecodeError as error:
         raise ValueError(f"{path} is not a list of records: {error}; run the experiment again") \
             from error
+    if not records:
+        raise ValueError(f"{path} has no record; run the experiment again")
+    return records
 
 
 def sealed(records, tables):

@@ -92,6 +92,12 @@ def test_a_check_of_our_own_is_judged_by_its_new_rule(sets):
     assert found(sets({"a": [old]}, {"a": [new]})) == {}
 
 
+def test_a_number_that_another_experiment_records_now_is_the_same_number(sets):
+    changed = found(sets({"a": [record("a.x", 0.01)]}, {"b": [record("a.x", 0.03)]}))
+    assert [(one.kind, one.experiment, one.values) for one in changed.values()] == [
+        ("worse", "b", (0.01, 0.03))]
+
+
 def test_an_experiment_that_raises_is_worse(sets):
     failed = record("a", None, unit="", comparator="runs", bound=None)
     changed = found(sets({"a": [record("a.x", 0.01)]}, {"a": [failed]}))
@@ -108,6 +114,7 @@ def test_a_remark_of_older_records_is_no_number(sets):
     (("chosen", "uncredited"), False, "other verdict"), (("miss", "miss"), True, "moved"),
     (("info", "miss"), False, "worse"), (("pass", "info"), False, "other verdict"),
     (("miss", "info"), True, "other verdict"), (("chosen", "pass"), False, "improved"),
+    (("miss", "chosen"), True, "other verdict"), (("miss", "uncredited"), True, "other verdict"),
     (("pass", "pass"), False, None),
     ((None, "miss"), True, "new"), (("pass", None), True, "lost")])
 def test_the_kind_of_a_change(verdicts, moved, kind):

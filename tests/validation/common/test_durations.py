@@ -26,8 +26,13 @@ def test_times_are_those_of_the_experiments_of_the_profile():
                               "records took 1.5 min of CPU time, 1.0 min by the clock")
 
 
+def test_a_record_of_another_experiment_does_not_count():
+    found = durations([Experiment("a.c", "", ("standard",), {}, None)], Stored(), "standard")
+    assert (found.stored, found.cpu) == (0, 0.0)
+
+
 def test_long_times_are_in_hours():
-    assert [hours(s) for s in (30.0, 3599.0, 9000.0)] == ["0.5 min", "60.0 min", "2.5 h"]
+    assert [hours(s) for s in (30.0, 3599.0, 9000.0)] == ["0.5 min", "1.0 h", "2.5 h"]
 
 
 def test_without_records_the_times_are_those_expected():
