@@ -58,6 +58,7 @@ bench: $(READY)  ## our kernels beside Taichi and Warp (installs both), features
 	$(PIP) install -c constraints.txt -e '.[bench]'
 	$(PY) -m benchmarks blocks
 	$(PY) -m benchmarks gradients
+	$(PY) -m pytest -q tests/oracle/test_conformance.py
 	$(PY) -m benchmarks conformance
 	$(PY) -m benchmarks features
 	$(PY) -m benchmarks hot

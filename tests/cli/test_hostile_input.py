@@ -43,7 +43,7 @@ def test_a_text_without_end_is_told(tmp_path):
     (("rom", "generate", "gravty_small"), "did you mean gravity_small?"),
     (("law", "train", "law_jely"), "did you mean law_jelly? `mpm-ref law studies` lists all"),
     (("law", "train", "hello"), "bundled studies of laws: law_"),
-    (("rom", "generate", "law_jely"), "bundled studies of reduced models: "),
+    (("rom", "generate", "law_jely"), "did you mean jelly? `mpm-ref rom studies` lists all"),
     (("run", "quite_other"), "bundled scenes: cantilever,"),
 ])
 def test_the_nearest_name_is_offered(arguments, near):

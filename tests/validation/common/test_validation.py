@@ -281,6 +281,22 @@ def test_list(invoke, tmp_path):
         assert last[:2] == [{"quick": "2", "paper": "0"}[profile], "experiments"]
 
 
+def test_the_list_has_the_time_of_the_records_of_its_folder(invoke, tmp_path):
+    invoke("run", "verification.sound", "--results", str(tmp_path))
+    assert "the 1 that have records took" in invoke("list", "--results", str(tmp_path)).output
+    assert "records" not in invoke("list", "--results", str(tmp_path / "other")).output
+
+
+@pytest.mark.parametrize(("content", "fault"), [
+    ("[{", "is not a list of records"), ("[]", "has no record")])
+def test_a_damaged_record_ends_the_list_with_a_sentence(invoke, tmp_path, content, fault):
+    invoke("run", "verification.sound", "--results", str(tmp_path))
+    (tmp_path / "quick" / "verification.sound.json").write_text(content)
+    said = invoke("list", "--results", str(tmp_path))
+    assert said.exit_code == 2
+    assert fault in said.stderr
+
+
 def test_run_writes_results_and_report(invoke, tmp_path):
     said = invoke("run", "verification.sound", "--results", str(tmp_path))
     assert said.exit_code == 0, said.output
