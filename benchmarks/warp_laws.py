@@ -36,17 +36,26 @@ def expand(q: Any, after: Any, k: Any):
     after.J[p] = wp.determinant(identity(L) + k.dt * L) * q.J[p]
 
 
-def decomposition(svd):
-    """Return the kernel that decomposes F = U diag(s) V^T by `wp.svd2` or `wp.svd3`."""
-    @wp.kernel(module="unique")
-    def decompose(q: Any, k: Any):
-        p = wp.tid()
-        U, s, V = svd(q.F[p])
-        q.U[p] = U
-        q.s[p] = s
-        q.V[p] = V
+# Warp 1.19 takes the kernels that a factory makes of `wp.svd2` and `wp.svd3` for one.
 
-    return decompose
+@wp.kernel
+def decompose_2d(q: Any, k: Any):
+    """Decompose F = U diag(s) V^T in 2D."""
+    p = wp.tid()
+    U, s, V = wp.svd2(q.F[p])
+    q.U[p] = U
+    q.s[p] = s
+    q.V[p] = V
+
+
+@wp.kernel
+def decompose_3d(q: Any, k: Any):
+    """Decompose F = U diag(s) V^T in 3D."""
+    p = wp.tid()
+    U, s, V = wp.svd3(q.F[p])
+    q.U[p] = U
+    q.s[p] = s
+    q.V[p] = V
 
 
 @wp.kernel

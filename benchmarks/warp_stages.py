@@ -14,7 +14,7 @@ from .conformance_cases import double_svd
 
 REALS = {"f32": wp.float32, "f64": wp.float64}
 INDICES = (wp.int32, wp.bool)
-DECOMPOSE = {2: warp_laws.decomposition(wp.svd2), 3: warp_laws.decomposition(wp.svd3)}
+DECOMPOSE = {2: warp_laws.decompose_2d, 3: warp_laws.decompose_3d}
 
 
 @cache

@@ -203,6 +203,16 @@ def test_a_backend_agrees_and_an_error_is_found_where_it_is(name, golden, backen
 
 
 @pytest.mark.parametrize("name", BACKENDS)
+def test_one_process_makes_steps_in_2d_and_in_3d(name, golden, tmp_path, backend):
+    process = backend(name, "f64")
+    for path in (golden, record_case(Case(3, "mls", "sand"), tmp_path / "golden.h5")):
+        row = checked_row(path, [stages for stages, _ in process.run((read_start(path), "double"))],
+                          "f64")
+        assert row["agrees"], row["first"]
+        process.run((read_start(path), "library"))
+
+
+@pytest.mark.parametrize("name", BACKENDS)
 def test_single_precision_is_single(name, golden, backend):
     answers = backend(name, "f32").run((read_start(golden), "library"))
     stages = [stages for stages, _ in answers]
