@@ -8,6 +8,7 @@ from command_line import assert_told, mpm_ref
 from small_studies import CURVED, STEPS, ended, write
 
 from mpm_ref.cli.catalogue import bundled_studies
+from mpm_ref.cli.study_kinds import is_study
 from mpm_ref.rom.study import reduce
 from mpm_ref.rom.study.generate import FINISHED, GeneratedRun
 from mpm_ref.rom.study.methods import LDM_METHOD
@@ -95,8 +96,11 @@ def test_a_folder_is_not_named_as_files_are(made, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_study_that_does_not_exist_is_told_with_those_that_do():
-    assert_told(mpm_ref("rom", "generate", "none"), 2, "no such file", *bundled_studies())
+def test_a_study_that_does_not_exist_is_told_with_those_of_reduced_models():
+    told = mpm_ref("rom", "generate", "none")
+    for name, path in bundled_studies().items():
+        assert (name in told.stderr.split(": ")[-1].strip().split(", ")) == is_study(path)
+    assert_told(told, 2, "no such file")
 
 
 def test_ctrl_c_says_how_far_it_is_and_how_to_go_on(made, tmp_path, monkeypatch):
