@@ -6,14 +6,16 @@ import sys
 import pytest
 
 from validation.common import change_table
+from validation.common.change_table import ReasonFile
 from validation.common.citations import ROOT, documentation, exists
+from validation.common.compare import ChangedRecord
 from validation.common.targets import load
 from validation.common.verdicts import VARIANTS
 
 sys.path.insert(0, str(ROOT / "docs"))
 
 from check_links import main as check
-from extensions import atlas, docstrings, generate, packages, results
+from extensions import atlas, change_page, docstrings, generate, packages, results
 
 SOURCE = re.compile(r"\{source\}`(?:[^`<]*<)?([^`>]+)>?`")
 
@@ -211,3 +213,12 @@ def test_the_page_of_changes_has_the_reason_of_each_worse_verdict(result_pages):
     assert page.count("→ miss | ") == sum(
         one.kind == "worse" and one.verdicts[1] == "miss" for one in change_table.read())
     assert "| not known |" not in page
+
+
+def test_new_numbers_are_counted_by_verdict_and_a_verdict_that_is_missing_has_a_word():
+    rows = [ChangedRecord("worse", "a", "a", (None, None), 0.0, (None, "miss"), (None, "b")),
+            *(ChangedRecord("new", "a", f"a.{k}", (None, 1.0), 0.0, (None, word), (None, "b"))
+              for k, word in enumerate(("miss", "pass", "miss")))]
+    text = "\n".join(change_page.lines(rows, ReasonFile("abc")))
+    assert "| 3 | new numbers: 2 miss, 1 pass |" in text
+    assert "| none → miss | not known |" in text
