@@ -9,6 +9,7 @@ import pytest
 from figures.common.bodies import no_balls
 from figures.nclaw import fig02d, fig04c
 from mpm_ref.materials import Fluid, NoFlow
+from validation.common.record import Measurement, write_records
 from validation.common.results import ProfileResults
 from validation.common.run import RunSetting, run_all
 from validation.ldm.published_bodies import keep
@@ -25,7 +26,9 @@ mpl.use("Agg")
 def kept(folder, id, **arrays):
     """Results that hold points of an experiment."""
     keep(SimpleNamespace(folder=folder, experiment=SimpleNamespace(id=id)), **arrays)
-    (folder / f"{id}.json").write_text("[]")
+    write_records(folder / f"{id}.json", [Measurement(
+        target=id, value=0.0, unit="1", scale="", seconds=0.0, seed=0, command="", commit="",
+        date="", cores=1)])
     return ProfileResults(folder)
 
 
