@@ -76,8 +76,8 @@ def laws_by_seed(laws):
 
 def record_task(run, task, method, seed_errors):
     """Record the median of a method's errors over its seeds [m^2] on a task, (environment, task),
-    and the largest over the smallest where no run broke down. The median is judged, by the printed
-    error of the paper's laws, where all seeds are trained.
+    and the largest over the smallest of two or more where no run broke down. The median is judged,
+    by the printed error of the paper's laws, where all seeds are trained.
     """
     name, what = task
     table = "nclaw.table1" if what == "reconstruction" else "nclaw.table2"
@@ -89,6 +89,6 @@ def record_task(run, task, method, seed_errors):
     id, where = f"nclaw.seeds.{method}.{name}.{what}", scale(run, name, what)
     run.record(id, float(np.median(seed_errors)), unit="m^2", **rule, scale=where,
                note=f"median of {spread_text(seed_errors)}{word}")
-    if np.isfinite(seed_errors).all():
+    if len(seed_errors) > 1 and np.isfinite(seed_errors).all():
         run.record(f"{id}.spread", max(seed_errors) / min(seed_errors), unit="1",
                    comparator="info", scale=where, note="largest error of a seed over the smallest")

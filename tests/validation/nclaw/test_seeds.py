@@ -38,9 +38,10 @@ def test_median_of_seeds_stands_beside_the_printed_error(profile, rule):
     assert found[id] == (4.5e-6, "info", None)      # a seed is missing
 
 
-def test_there_is_no_spread_where_a_seed_breaks_down():
+@pytest.mark.parametrize("errors", [[1e-6, float("inf"), 2e-6, 2e-6], [2e-6]])
+def test_there_is_no_spread_of_one_seed_nor_where_one_breaks_down(errors):
     found = {}
     run = SimpleNamespace(profile="standard",
                           record=lambda name, value, **rest: found.update({name: value}))
-    record_task(run, ("water", "velocity"), "ours", [1e-6, float("inf"), 2e-6])
+    record_task(run, ("water", "velocity"), "ours", errors)
     assert found == {"nclaw.seeds.ours.water.velocity": 2e-6}
