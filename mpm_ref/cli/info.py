@@ -215,7 +215,8 @@ def budget_line(part):
 
 
 def describe(
-    name: Annotated[str, typer.Argument(metavar="FILE|SCENE|STUDY")],
+    name: Annotated[str, typer.Argument(metavar="FILE|SCENE|STUDY", help="A file, or the name of "
+                                        "a bundled scene or study.")],
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ):
     """Describe a results file, checkpoint, scene, study, reduced model or learned law."""

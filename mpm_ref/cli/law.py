@@ -27,6 +27,7 @@ from .options import (
     Overwrite,
     SceneName,
     WeightsFile,
+    examples,
     learned_law_warnings,
     load_matching,
     on_interrupt,
@@ -40,11 +41,12 @@ app = typer.Typer(no_args_is_help=True, help="Train laws on the motion of a scen
                   "with the true ones, and export them to other programs.",
                   epilog="`mpm-ref law studies` lists the bundled law studies; "
                   "docs/reference/studies.md explains how to write one.")
-app.command()(law_info.studies)
-app.command()(law_train.train)
+app.command(epilog=examples("law", "studies"))(law_info.studies)
+app.command(epilog=examples("law", "train law_jelly_small --out laws.npz",
+                            "train law_jelly --seeds 3"))(law_train.train)
 
 
-@app.command()
+@app.command(epilog=examples("law", "evaluate laws.npz nclaw_jelly --steps 100"))
 def evaluate(
     file: WeightsFile,
     name: SceneName,
@@ -125,7 +127,7 @@ def lines(facts, problem):
 LAYERS = (".npz", ".json")
 
 
-@app.command()
+@app.command(epilog=examples("law", "export laws.npz", "export laws.npz --out layers.json"))
 def export(
     file: WeightsFile,
     out: Annotated[Path | None, typer.Option(
@@ -160,7 +162,7 @@ def described(trained):
     return f"{type(trained.kind).__name__} {'-'.join(map(str, sizes))}".strip()
 
 
-@app.command()
+@app.command(epilog=examples("law", "plot laws.npz --against nclaw_jelly --out curves.pdf"))
 def plot(
     file: WeightsFile,
     against: Annotated[str, typer.Option(metavar="SCENE", help="Scene with the true laws.")],

@@ -122,9 +122,9 @@ Scheduler = Annotated[str | None, typer.Option(
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the file of --out.")]
 
 
-def examples(*commands):
-    """Return examples of commands, a line each, for the end of a help text."""
-    return "\n\n".join(["Examples:", *(f"mpm-ref rom {command}" for command in commands)])
+def examples(group, *commands):
+    """Return examples of a group's commands, a line each, for the end of a help text."""
+    return "\n\n".join(["Examples:", *(f"mpm-ref {group} {command}" for command in commands)])
 
 
 def load_study(name):

@@ -10,6 +10,7 @@ from .. import oracle, scene
 from ..store.text import counted
 from .catalogue import find_scene, require_other_file
 from .errors import at_start, exit_on_errors, options
+from .options import SceneName
 from .terminal import compiling, warn
 
 DEPARTS = 1      # exit status of a check in which an array departs
@@ -20,7 +21,7 @@ app = typer.Typer(no_args_is_help=True, help="Record golden files, and check oth
 
 @app.command()
 def record(
-    name: Annotated[str, typer.Argument(metavar="SCENE")],
+    name: SceneName,
     out: Annotated[Path, typer.Option("--out", "-o", help="Golden file.")] = Path("golden.h5"),
     steps: Annotated[int, typer.Option(help="Number of steps to record.")] = 3,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a golden file.")] = False,

@@ -59,19 +59,20 @@ app = typer.Typer(no_args_is_help=True, help="Train a reduced model on many runs
                   "run it with a few numbers instead of particles.",
                   epilog="`mpm-ref rom studies` lists the bundled studies of reduced models; "
                   "docs/reference/studies.md explains how to write one.")
-app.command(epilog=examples("studies"))(rom_info.studies)
-app.command("generate", epilog=examples(
-    "generate gravity_small", "generate torsion --workers 1 --out runs"))(rom_train.make_data)
-app.command(epilog=examples("train gravity_small",
+app.command(epilog=examples("rom", "studies"))(rom_info.studies)
+app.command("generate", epilog=examples("rom", "generate gravity_small",
+                                        "generate torsion --workers 1 --out runs"))(
+    rom_train.make_data)
+app.command(epilog=examples("rom", "train gravity_small",
                             "train gravity --kind modes --out modes.npz"))(rom_train.train)
-app.command(epilog=examples("play gravity_small", "play gravity --set g=5 --view xz",
+app.command(epilog=examples("rom", "play gravity_small", "play gravity --set g=5 --view xz",
                             "play gravity_small --seconds 5 --keys '1 right, 2 up, 4 r'"))(
     rom_play.play)
 Set = Annotated[list[str] | None, typer.Option(
     "--set", help="NAME=VALUE for a parameter of the study; repeat it for each one.")]
 
 
-@app.command(epilog=examples("run gravity_small --set g=3.3",
+@app.command(epilog=examples("rom", "run gravity_small --set g=3.3",
                              "run torsion --set v=0.2 --set w=1.5 --out twist.h5"))
 def run(
     name: StudyName,
@@ -172,7 +173,7 @@ def range_warnings(out_of_bounds, states, dt):
 
 
 @app.command("evaluate", epilog=examples(
-    "evaluate gravity_small", "evaluate gravity --map modes.npz --json"))
+    "rom", "evaluate gravity_small", "evaluate gravity --map modes.npz --json"))
 def evaluate_runs(
     name: StudyName,
     map_file: MapFile = None,

@@ -24,7 +24,8 @@ def plot(
     frame: Annotated[int, typer.Option(help="Frame, counted from 0; -1 is the last.")] = -1,
     field: Scalar = "speed",
     view: View = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.png")] = None,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="Picture (.png, .pdf or .svg), default: FILE.png.")] = None,
 ):
     """Plot the particles and solids of one frame (png, pdf or svg).
 
@@ -39,7 +40,8 @@ def animate(
     field: Scalar = "speed",
     view: View = None,
     fps: Annotated[int, typer.Option(help="Frames per second.", min=1, max=100)] = 20,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.gif")] = None,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="Animation, default: FILE.gif.")] = None,
 ):
     """Create a GIF animation of all frames."""
     _to_file(plotting.animate, file, out, (".gif",), field=field, view=view_axes(view), fps=fps)
@@ -48,7 +50,8 @@ def animate(
 def export(
     file: ResultsFile,
     grid: Annotated[bool, typer.Option("--grid", help="Export nodes, not particles.")] = False,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="FILE.vtkhdf")] = None,
+    out: Annotated[Path | None, typer.Option(
+        "--out", "-o", help="File for ParaView (.vtkhdf or .hdf), default: FILE.vtkhdf.")] = None,
 ):
     """Export results as VTKHDF for ParaView: particles, or density and velocity of nodes."""
     _to_file(export_grid if grid else export_particles, file, out, (".vtkhdf", ".hdf"))
