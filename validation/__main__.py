@@ -2,6 +2,7 @@
 
 import sys
 import traceback
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Literal
@@ -14,12 +15,14 @@ from mpm_ref.executor import BadScheduler, SchedulerLost
 from .common import targets
 from .common.cluster_run import run_on_cluster
 from .common.compare import COLUMNS, changes, changes_text, stored_results
-from .common.durations import durations
+from .common.durations import HOUR, durations
 from .common.parallel import run_side_by_side
+from .common.progress import SuiteProgress
 from .common.provenance import commit
 from .common.recheck import recheck, sample
 from .common.record import write_whole
 from .common.registry import discover, select
+from .common.renew import affordable, commit_records, due, renew_all, require_clean
 from .common.report import status_table, write_report
 from .common.results import RESULTS, ROOT, ProfileResults
 from .common.run import RunSetting, csv_bytes, run_all
@@ -128,6 +131,41 @@ def status(profile: Profile = "standard", results: Folder = RESULTS, strict: Str
     for sentence in wrong if strict else ():
         typer.echo(sentence, err=True)
     raise typer.Exit(max(_report_broken(catalogue.broken), int(strict and bool(wrong))))
+
+
+@app.command()
+def renew(
+        ids: Ids = None, profile: Profile = "standard", results: Folder = RESULTS,
+        hours: Annotated[float | None, typer.Option(
+            min=0.0, help="CPU time of the experiments, as recorded; default: of all")] = None,
+        times: Annotated[bool, typer.Option("--times", help="those with judged times instead, each "
+                                            "once other processes are idle")] = False,
+        commits: Annotated[bool, typer.Option("--commit", help="commit the records, every 20 "
+                                              "minutes and at the end")] = False):
+    """Run the experiments whose records are not of today's source, the cheapest first.
+
+    Each runs in a process of its own and loses its marker in stale.toml. An interrupted renewal
+    goes on where it stopped. The exit code is 1 where an experiment raised.
+    """
+    catalogue, folder, printed = discover(), results / profile, targets.load()
+    source = commit(ROOT)
+    try:
+        chosen = select(catalogue.experiments, ids, profile)
+        require_clean(source)
+    except ValueError as error:
+        typer.echo(f"{error}", err=True)
+        raise typer.Exit(2) from None
+    found = affordable(due(ProfileResults(folder), chosen, profile, printed, timed=times),
+                       hours and hours * HOUR)
+    setting = RunSetting(profile, folder, 0, printed, source)
+    keep = partial(commit_records, ROOT, setting) if commits else len
+    with SuiteProgress([one.experiment.seconds(profile) for one in found]) as progress:
+        failed = renew_all([one.experiment for one in found], setting, progress, timed=times,
+                           commit=keep)
+    _write_report(folder, profile, printed)
+    for id in failed:
+        typer.echo(f"failed: {id}", err=True)
+    raise typer.Exit(max(_report_broken(catalogue.broken), int(bool(failed))))
 
 
 @app.command("recheck")

@@ -17,6 +17,7 @@ from .verdicts import judged
 
 QUIET = 0.1             # cores that others keep busy, in the mean, up to which times are judged
 MARKERS = "stale.toml"  # in the folder that holds the profiles
+HEADING = "[[marker]]"  # of one of them in that file
 
 WORDS = {       # of states, as the command line lists them
     "edited": "changed by hand after they were made",
