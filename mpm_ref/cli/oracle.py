@@ -65,7 +65,10 @@ def check(
     precision: Annotated[str, typer.Option(help="f64, f32, or auto: that of the arrays.")] = "auto",
     json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ):
-    """Report the first deviating stage, where and by how much. Exit status: 0 if none, 1 if any."""
+    """Report the first deviating stage, where and by how much.
+
+    Exit status: 0 no deviation, 1 a deviation, or nothing to compare, 2 bad input.
+    """
     with exit_on_errors(), options():
         report = oracle.check(golden, other, precision)
     print(report.json if json else report)

@@ -301,7 +301,7 @@ def by_node(group, theirs, array, a, golden):
     name, listing = array.name, node_list(array)
     if listing not in theirs:
         raise NotComparable(f"{name} is given without `{listing}`: expected (M, d) integer "
-                            "coordinates")
+                            "coordinates; a whole grid is written with its `origin`")
     nodes, ours = theirs[listing][()], group[listing][()]
     if nodes.shape[1:] != ours.shape[1:]:
         raise NotComparable(f"{listing} has shape {nodes.shape}: expected (M, {ours.shape[1]}) "

@@ -309,6 +309,10 @@ def require_key(name):
 def as_lists(arrays):
     """Return {key: array} with whole grids, given with `origin`, as lists over nodes with mass."""
     if "origin" not in arrays:
+        if np.ndim(arrays.get("mass", 0.0)) > 1:
+            raise ValueError(f"mass has the shape {np.shape(arrays['mass'])} without `origin`: add "
+                             "the integer coordinates of the first node of the grid, (d,); or give "
+                             "the masses of M nodes, (M,), with `nodes`, (M, d)")
         return arrays
     if "mass" not in arrays:
         raise ValueError("origin without mass: whole grids need `mass`, which selects their nodes; "

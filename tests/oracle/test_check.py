@@ -174,6 +174,8 @@ def test_misuse_is_one_sentence(golden, checked, theirs, tmp_path):
     no_nodes = [{"mass": theirs[0]["mass"]}]
     with pytest.raises(oracle.NotComparable, match="mass is given without `nodes`"):
         checked(no_nodes)
+    with pytest.raises(ValueError, match=r"steps\[0\]: mass has the shape \(4, 4\) without `or"):
+        checked([{"mass": np.ones((4, 4))}])
     with pytest.raises(oracle.NotComparable, match="expected 'f64', 'f32' or 'auto'"):
         checked(theirs, precision="f16")
     with pytest.raises(ValueError, match="array 'jelly/speed': expected one of weights, mass"):

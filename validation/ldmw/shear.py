@@ -24,7 +24,7 @@ LOSSES = {"none": NEITHER, "temporal": NO_F, "both": WORKSHOP}
             profiles=("quick", "standard"), budget={"quick": 5, "standard": 5})
 def losses(run):
     """Errors by the terms of the loss; with the printed weights read as SI units; of POD."""
-    tests = test_runs(run, SHEAR3)
+    tests = study_runs(SHEAR3, SHEAR3.test)
     every = by_points(np.arange(len(tests.X)))
     for row, terms in LOSSES.items():
         net, name = f"shear3-{terms}", f"ldmw.table1.{row}"
@@ -45,7 +45,7 @@ def losses(run):
             profiles=("quick", "standard"), budget={"quick": 5, "standard": 5})
 def approaches(run):
     """Errors of both approaches, with all points and with a few; of POD."""
-    tests = test_runs(run, SHEAR17)
+    tests = study_runs(SHEAR17, SHEAR17.test)
     every, few = np.arange(len(tests.X)), spread(tests.X, HYPER)
     rows = {"point": by_points(every), "node": by_nodes(every),
             f"point_hyper{HYPER}": by_points(few), f"node_hyper{HYPER}": by_nodes(few, HYPER)}
@@ -64,8 +64,3 @@ def forceless(approach):
         return replace(stepper, field=field._replace(law=law)), choose
 
     return softened
-
-
-def test_runs(run, study):
-    """Return the `StudyRuns` of a profile's tests."""
-    return study_runs(study, study.test[:run.choose(quick=1, standard=None)])
