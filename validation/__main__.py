@@ -4,6 +4,7 @@ import sys
 import traceback
 from functools import partial
 from pathlib import Path
+from subprocess import CalledProcessError
 from tempfile import TemporaryDirectory
 from typing import Annotated, Literal
 
@@ -137,34 +138,36 @@ def status(profile: Profile = "standard", results: Folder = RESULTS, strict: Str
 def renew(
         ids: Ids = None, profile: Profile = "standard", results: Folder = RESULTS,
         hours: Annotated[float | None, typer.Option(
-            min=0.0, help="CPU time of the experiments, as recorded; default: of all")] = None,
-        times: Annotated[bool, typer.Option("--times", help="those with judged times instead, each "
-                                            "once other processes are idle")] = False,
-        commits: Annotated[bool, typer.Option("--commit", help="commit the records, every 20 "
-                                              "minutes and at the end")] = False):
+            min=0.0, help="CPU time of the experiments, as recorded, without the start of their "
+            "processes; default: of all")] = None,
+        times: Annotated[bool, typer.Option("--times", help="those with judged times, or without "
+                                            "records, instead; each once other processes are idle")]
+        = False,
+        commits: Annotated[bool, typer.Option("--commit", help="commit each record")] = False):
     """Run the experiments whose records are not of today's source, the cheapest first.
 
     Each runs in a process of its own and loses its marker in stale.toml. An interrupted renewal
     goes on where it stopped. The exit code is 1 where an experiment raised.
     """
-    catalogue, folder, printed = discover(), results / profile, targets.load()
-    source = commit(ROOT)
+    catalogue, folder, printed, source = discover(), results / profile, targets.load(), commit(ROOT)
+    setting = RunSetting(profile, folder, 0, printed, source)
     try:
-        chosen = select(catalogue.experiments, ids, profile)
         require_clean(source)
-    except ValueError as error:
+        chosen = select(catalogue.experiments, ids, profile)
+        all_due = due(ProfileResults(folder), chosen, profile, printed, timed=times)
+        found = affordable(all_due, None if hours is None else hours * HOUR)
+        typer.echo(f"{len(found)} of {len(all_due)} experiments that are due, "
+                   f"{sum(one.seconds for one in found) / HOUR:.2f} h of CPU time as recorded")
+        with SuiteProgress([one.experiment.seconds(profile) for one in found]) as progress:
+            failed = renew_all([one.experiment for one in found], setting, progress, timed=times,
+                               source=partial(commit, ROOT),
+                               commit=partial(commit_records, ROOT, setting) if commits else len)
+    except (ValueError, CalledProcessError) as error:
         typer.echo(f"{error}", err=True)
         raise typer.Exit(2) from None
-    found = affordable(due(ProfileResults(folder), chosen, profile, printed, timed=times),
-                       hours and hours * HOUR)
-    setting = RunSetting(profile, folder, 0, printed, source)
-    keep = partial(commit_records, ROOT, setting) if commits else len
-    with SuiteProgress([one.experiment.seconds(profile) for one in found]) as progress:
-        failed = renew_all([one.experiment for one in found], setting, progress, timed=times,
-                           commit=keep)
     _write_report(folder, profile, printed)
     for id in failed:
-        typer.echo(f"failed: {id}", err=True)
+        typer.echo(f"failed: {id}; its old records are left", err=True)
     raise typer.Exit(max(_report_broken(catalogue.broken), int(bool(failed))))
 
 

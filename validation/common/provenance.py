@@ -107,11 +107,14 @@ def blas():
 
 
 def commit(root):
-    """Return the commit of the source at `root`, with "+changes" if more than results differ."""
-    head = _git(root, "rev-parse", "--short=12", "HEAD")
+    """Return the last commit at `root` that changed more than results, with "+changes" if more than
+    results differ from it.
+    """
+    source = ("--", ".", ":!results")
+    head = _git(root, "log", "-1", "--format=%h", "--abbrev=12", *source)
     if not head:
         return "unknown"
-    changes = _git(root, "status", "--porcelain", "--", ".", ":!results")
+    changes = _git(root, "status", "--porcelain", *source)
     return head + ("+changes" if changes else "")
 
 

@@ -1,8 +1,8 @@
 """Run again the experiments whose records are not of today's source, the cheapest first.
 
-Each runs in a process of its own, and its records replace the old ones when it has ended, so that
-a renewal that is interrupted goes on where it stopped. Experiments with judged times are another
-renewal: each waits until other processes leave the machine alone.
+Each runs in a process of its own. Its records replace the old ones if it ends well, and are put
+back if not, so that a renewal that is interrupted goes on where it stopped. Experiments with judged
+times are another renewal: each waits until other processes leave the machine alone.
 """
 
 import json
@@ -16,12 +16,19 @@ import msgspec
 from .parallel import experiment_of, run_in_pool
 from .provenance import busy_cores, occupation
 from .record import write_whole
-from .standing import HEADING, MARKERS, QUIET, MarkerFile, is_judged_time, state_of
+from .standing import (
+    HEADING,
+    MARKERS,
+    QUIET,
+    MarkerFile,
+    is_judged_time,
+    state_of,
+    was_disturbed,
+)
 from .verdicts import judged
 
 WIDTH = 100             # columns of results/stale.toml
 WINDOW = 5.0            # [s] over which the work of other processes is measured
-BETWEEN = 1200.0        # [s] between commits
 
 
 class DueExperiment(NamedTuple):
@@ -39,26 +46,31 @@ def due(stored, experiments, profile, targets, *, timed):
         experiments: those to choose from.
         profile: of the records.
         targets: the papers' printed numbers.
-        timed: whether to return those with judged times, or the others.
+        timed: whether to return those with judged times, of which current ones are due too if they
+            were measured beside other work, and those that have no records; or the others.
     """
-    found = []
+    found, ids = [], set(stored.ids())
     for one in experiments:
-        records = stored.records(one.id) if one.id in stored.ids() else []
-        if (profile in one.profiles and has_judged_time(records, targets) is timed
-                and not (records and is_current(stored, one))):
+        if profile not in one.profiles:
+            continue
+        records = stored.records(one.id) if one.id in ids else []
+        needs_quiet = not records or has_judged_time(records, targets)
+        renewed = records and state_of(stored, one.id, one) == "current" and not (
+            raised(records) or was_disturbed(records, targets))
+        if needs_quiet is timed and not renewed:
             found.append(DueExperiment(
                 one, records[0].cpu_seconds if records else one.seconds(profile)))
     return sorted(found, key=lambda entry: (entry.seconds, entry.experiment.id))
 
 
-def is_current(stored, experiment):
-    """Return whether the records of an experiment are of today's source."""
-    return state_of(stored, experiment.id, experiment) == "current"
-
-
 def has_judged_time(records, targets):
     """Return whether one of the records is a time, or a ratio of times, with a verdict."""
     return any(is_judged_time(record, judged(record, targets)) for record in records)
+
+
+def raised(records):
+    """Return whether the run of an experiment that made the records raised."""
+    return any(record.comparator == "runs" for record in records)
 
 
 def affordable(entries, seconds):
@@ -74,36 +86,62 @@ def affordable(entries, seconds):
     return chosen
 
 
-def renew_all(experiments, setting, progress, *, timed, commit, find=experiment_of):
-    """Run experiments, one at a time, and return the ids of those that raised.
+def renew_all(experiments, setting, progress, *, timed, source, commit, find=experiment_of):
+    """Run experiments, one at a time, and return the ids of those that failed.
 
     Args:
         experiments: a list of `Experiment`s.
         setting: the `RunSetting`.
         progress: a `SuiteProgress`.
         timed: whether each waits for a quiet machine.
-        commit: called with the ids of experiments whose records are new: every BETWEEN seconds,
-            and at the end, an interruption included.
+        source: called without arguments for the commit of the source, which is to stay that of
+            the setting.
+        commit: called with the id of each experiment that has ended well.
         find: see `run_side_by_side`.
+
+    Raises ValueError where the source changes meanwhile; what was kept before stays.
     """
-    failed, new, last = [], [], time.monotonic()
-    try:
-        for one in experiments:
-            if timed:
-                wait_for_quiet(progress.say)
-            raised = run_in_pool([one], setting, find, progress)
-            if raised:
-                failed += raised
-                continue
-            drop_marker(setting.folder.parent / MARKERS, setting.profile, one.id)
-            new.append(one.id)
-            if time.monotonic() - last > BETWEEN:
-                commit(new)
-                new, last = [], time.monotonic()
-    finally:
-        if new:
-            commit(new)
+    failed = []
+    for one in experiments:
+        require_same(setting.commit, source())
+        if timed:
+            wait_for_quiet(progress.say)
+        old = stored_files(setting.folder, one.id)
+        ended = False
+        try:
+            ended = not run_in_pool([one], setting, find, progress)
+            require_same(setting.commit, source())
+        except BaseException:
+            put_back(setting.folder, one.id, old)
+            raise
+        if not ended:
+            put_back(setting.folder, one.id, old)
+            failed.append(one.id)
+            continue
+        drop_marker(setting.folder.parent / MARKERS, setting.profile, one.id)
+        commit(one.id)
     return failed
+
+
+def require_same(before, now):
+    """Raise ValueError where the source is not what it was."""
+    if now != before:
+        raise ValueError(f"the source changed from {before} to {now} meanwhile: records name one "
+                         "commit; run the renewal again, in a working tree of its own")
+
+
+def stored_files(folder, experiment_id):
+    """Return {path: content} of the records, tables and points of an experiment."""
+    paths = [*folder.glob(f"{experiment_id}.*"), *folder.glob(f"bodies/{experiment_id}.npz")]
+    return {path: path.read_bytes() for path in paths}
+
+
+def put_back(folder, experiment_id, files):
+    """Make {path: content} the only files of an experiment again."""
+    for path in stored_files(folder, experiment_id).keys() - files.keys():
+        path.unlink()
+    for path, content in files.items():
+        write_whole(path, content)
 
 
 def wait_for_quiet(say, window=WINDOW):
@@ -122,13 +160,16 @@ def wait_for_quiet(say, window=WINDOW):
 
 def drop_marker(file, profile, experiment_id):
     """Remove the id of an experiment from the markers of a profile in a file, and a marker that
-    has no other id.
+    has no other id. A pattern of ids stays.
     """
     if not file.is_file():
         return
     text = file.read_text()
+    markers = msgspec.toml.decode(text, type=MarkerFile).marker
+    if not any((one.profile, id) == (profile, experiment_id) for one in markers for id in one.ids):
+        return
     kept = []
-    for one in msgspec.toml.decode(text, type=MarkerFile).marker:
+    for one in markers:
         ids = [id for id in one.ids if (one.profile, id) != (profile, experiment_id)]
         if ids:
             kept.append(marker_text(msgspec.structs.replace(one, ids=ids)))
@@ -147,23 +188,17 @@ def marker_text(marker):
             f"reason = {json.dumps(marker.reason, ensure_ascii=False)}\n")
 
 
-def commit_records(root, setting, ids):
-    """Commit the records and tables of experiments, and the markers that are left.
+def commit_records(root, setting, experiment_id):
+    """Commit the records, tables and points of an experiment, and the markers that are left.
 
     Raises subprocess.CalledProcessError; git has said why.
     """
-    files = [setting.folder / f"{id}.*" for id in ids]
-    if (markers := setting.folder.parent / MARKERS).is_file():
-        files.append(markers)
-    for arguments in (("add", "--all", "--", *files),
-                      ("commit", "--quiet", "--message", f"Records of {counted(ids)}",
-                       "--message", ", ".join(ids))):
-        subprocess.run(["git", *arguments], cwd=root, check=True)
-
-
-def counted(ids):
-    """Return the id of a single experiment, else how many there are."""
-    return ids[0] if len(ids) == 1 else f"{len(ids)} experiments"
+    paths = [setting.folder / f"{experiment_id}.*"]
+    paths += [path for path in (setting.folder / "bodies" / f"{experiment_id}.npz",
+                                setting.folder.parent / MARKERS) if path.exists()]
+    message = f"Record of {experiment_id}, {setting.profile}"
+    for arguments in (("add", "--all"), ("commit", "--quiet", "--message", message)):
+        subprocess.run(["git", *arguments, "--", *paths], cwd=root, check=True)
 
 
 def require_clean(source):

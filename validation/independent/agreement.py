@@ -17,7 +17,7 @@ def difference(a, b, change=None):
 def record_checks(run, group, checks):
     """Record the difference of each part of {part: (function that returns it, bound, scale, note)}
     under the id of a group. A difference is made of rounding errors, which another processor rounds
-    otherwise: its scatter is 1.
+    otherwise: its scatter is 1, and its bound alone judges.
     """
     for part, (agreement, bound, scale, note) in checks.items():
         run.record(f"{group}.{part}", agreement(), comparator="<=", bound=bound, unit="1",

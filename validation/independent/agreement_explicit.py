@@ -210,7 +210,7 @@ def explicit_steps(run):
                    note=f"{note}; largest difference to dense NumPy over the change in the run; "
                         f"{PER_STEP[name]:g} a step for rounding")
     run.record("independent.explicit.sand_projection", sand_projection(), unit="1",
-               comparator="<=", bound=PROJECTION, scale="60 trial strains",
+               comparator="<=", bound=PROJECTION, scale="60 trial strains", scatter=1.0,
                note="Drucker-Prager's return map against SLSQP's nearest strain of the cone: of "
                     "the same trace if pressed, in the norm of the energy if torn and in the polar "
                     "cone; for torn and sheared strains between both cones, and for pressed ones "

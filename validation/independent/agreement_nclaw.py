@@ -251,6 +251,7 @@ def learned_laws(run):
         run.note(MISSING)
         return
     run.record("independent.nclaw.loss_gradient", loss_gradient_agreement(), comparator="<=",
-               bound=WEIGHTS_BOUND, unit="1", scale=f"27 particles, {GRADIENT_STEPS} steps, sand",
+               bound=WEIGHTS_BOUND, unit="1", scatter=1.0,
+               scale=f"27 particles, {GRADIENT_STEPS} steps, sand",
                note=f"gradients by {PER_FIELD} weights of each layer of both laws; complex steps "
                     "against the training's, whose networks compute in single precision (6e-8)")

@@ -1,7 +1,6 @@
 """Experiments that are not of today's source run again: which, in what order, and what is kept."""
 
 import subprocess
-from itertools import chain, repeat
 from types import SimpleNamespace
 
 import msgspec
@@ -11,7 +10,7 @@ from typer.testing import CliRunner
 from validation import __main__ as cli
 from validation.common import renew
 from validation.common.record import Measurement, Origin, write_records
-from validation.common.registry import Experiment
+from validation.common.registry import Catalogue, Experiment
 from validation.common.renew import (
     DueExperiment,
     affordable,
@@ -62,13 +61,14 @@ def toys(id):
     return toy(id, bad if id == "toy.bad" else good)
 
 
-def store(folder, id, digest=None, **fields):
+def store(folder, id, digest=None, others=None, **fields):
     """Write the record of an experiment, of today's source unless a digest is given."""
-    fields = {"unit": "1", "cpu_seconds": 1.0, **fields}
+    fields = {"unit": "1", "cpu_seconds": 1.0, "comparator": "<=", "bound": 1.0, **fields}
     write_records(folder / f"{id}.json", [Measurement(
         target=f"{id}.error", value=0.5, scale="", seconds=1.0, seed=0, command="", commit="",
-        date="", cores=1, comparator="<=", bound=1.0,
-        origin=Origin(digest=digest or source_digest(table3.__module__)), **fields)])
+        date="", cores=1,
+        origin=Origin(digest=digest or source_digest(table3.__module__), others=others),
+        **fields)])
 
 
 def due_ids(folder, experiments, timed=False):
@@ -78,16 +78,25 @@ def due_ids(folder, experiments, timed=False):
 
 # Which, and in what order
 
-def test_those_are_due_that_have_no_record_of_today_the_cheapest_first(tmp_path):
+def test_those_are_due_that_are_not_of_today_or_raised_the_cheapest_first(tmp_path):
     store(tmp_path, "toy.current")
     store(tmp_path, "toy.dear", "0" * 16, cpu_seconds=7.0)
     store(tmp_path, "toy.cheap", "0" * 16, cpu_seconds=2.0)
+    store(tmp_path, "toy.raised", cpu_seconds=3.0, comparator="runs", bound=None)
+    assert due_ids(tmp_path, [toy(f"toy.{name}") for name in ("current", "dear", "cheap", "raised")
+                              ]) == [("toy.cheap", 2.0), ("toy.raised", 3.0), ("toy.dear", 7.0)]
+
+
+def test_judged_times_and_what_has_no_record_wait_for_a_quiet_machine(tmp_path):
+    store(tmp_path, "toy.numbers", "0" * 16)
     store(tmp_path, "toy.times", "0" * 16, unit="x")
+    store(tmp_path, "toy.quiet", unit="x", others=0.0)
+    store(tmp_path, "toy.disturbed", unit="x", others=0.9)
     experiments = [toy(f"toy.{name}", seconds=3.0)
-                   for name in ("current", "dear", "cheap", "new", "times")]
-    assert due_ids(tmp_path, experiments) == [("toy.cheap", 2.0), ("toy.new", 3.0),
-                                              ("toy.dear", 7.0)]
-    assert due_ids(tmp_path, experiments, timed=True) == [("toy.times", 1.0)]
+                   for name in ("numbers", "times", "quiet", "disturbed", "new")]
+    assert due_ids(tmp_path, experiments) == [("toy.numbers", 1.0)]
+    assert due_ids(tmp_path, experiments, timed=True) == [
+        ("toy.disturbed", 1.0), ("toy.times", 1.0), ("toy.new", 3.0)]
 
 
 def test_an_experiment_of_another_profile_is_not_due(tmp_path):
@@ -108,33 +117,55 @@ def setting(tmp_path):
     return RunSetting("quick", tmp_path / "quick", commit="abc")
 
 
-def test_records_are_kept_one_by_one_and_committed_but_for_those_that_raised(setting, monkeypatch):
-    monkeypatch.setattr(renew, "BETWEEN", 0.0)
+def renewed(experiments, setting, timed=False, source="abc", find=toys):
+    """Return the ids of those that failed, and of those whose records were to be committed."""
     kept = []
-    failed = renew_all([toys(id) for id in ("toy.good", "toy.bad", "toy.two-parts")], setting,
-                       PROGRESS, timed=False, commit=kept.append, find=toys)
-    assert (failed, kept) == (["toy.bad"], [["toy.good"], ["toy.two-parts"]])
+    return renew_all(experiments, setting, PROGRESS, timed=timed, source=lambda: source,
+                     commit=kept.append, find=find), kept
+
+
+def test_records_are_kept_and_committed_but_for_those_that_raised(setting):
+    store(setting.folder, "toy.bad")
+    (setting.folder / "toy.bad.curve.csv").write_text("x\n1\n")
+    before = renew.stored_files(setting.folder, "toy.bad")
+    assert renewed([toys("toy.good"), toys("toy.bad")], setting) == (["toy.bad"], ["toy.good"])
     assert ProfileResults(setting.folder).value("toy.good", "toy.good.error") == 0.5
+    assert renew.stored_files(setting.folder, "toy.bad") == before
     markers = msgspec.toml.decode((setting.folder.parent / "stale.toml").read_bytes(),
                                   type=MarkerFile).marker
-    assert [(one.profile, one.ids) for one in markers] == [("standard", ["toy.good"])]
+    assert [(one.profile, one.ids) for one in markers] == [
+        ("quick", ["toy.two-parts"]), ("standard", ["toy.good"])]
 
 
-def test_an_interrupted_renewal_commits_what_it_has(setting, monkeypatch):
-    answers = chain([[]], repeat(KeyboardInterrupt()))
-
+def test_an_interrupted_run_leaves_the_old_records(setting, monkeypatch):
     def run(*_):
-        answer = next(answers)
-        if isinstance(answer, BaseException):
-            raise answer
-        return answer
+        store(setting.folder, "toy.good", "1" * 16)
+        (setting.folder / "toy.good.curve.csv").touch()
+        raise KeyboardInterrupt
 
+    store(setting.folder, "toy.good")
+    before = renew.stored_files(setting.folder, "toy.good")
     monkeypatch.setattr(renew, "run_in_pool", run)
-    kept = []
     with pytest.raises(KeyboardInterrupt):
-        renew_all([toys("toy.good"), toys("toy.bad")], setting, PROGRESS, timed=False,
-                  commit=kept.append)
-    assert kept == [["toy.good"]]
+        renewed([toys("toy.good")], setting)
+    assert renew.stored_files(setting.folder, "toy.good") == before
+
+
+def test_a_source_that_changes_ends_the_renewal(setting, monkeypatch):
+    monkeypatch.setattr(renew, "run_in_pool", lambda *_: [])
+    with pytest.raises(ValueError, match="the source changed from abc to def meanwhile"):
+        renewed([toys("toy.good")], setting, source="def")
+    assert (setting.folder.parent / "stale.toml").read_text() == STALE
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_experiments_with_times_alone_wait(setting, monkeypatch, timed):
+    waits = []
+    monkeypatch.setattr(renew, "run_in_pool", lambda *_: [])
+    monkeypatch.setattr(renew, "wait_for_quiet", waits.append)
+    assert renewed([toys("toy.good"), toys("toy.new")], setting, timed) == (
+        [], ["toy.good", "toy.new"])
+    assert len(waits) == 2 * timed
 
 
 def test_times_wait_until_other_processes_are_idle(monkeypatch):
@@ -175,7 +206,7 @@ def git(folder, *words):
                           check=True, capture_output=True, text=True).stdout
 
 
-def test_a_commit_has_records_and_markers_and_nothing_else(setting, monkeypatch):
+def test_a_commit_has_the_files_of_an_experiment_and_markers_and_nothing_else(setting, monkeypatch):
     root = setting.folder.parent
     for name in ("AUTHOR", "COMMITTER"):
         monkeypatch.setenv(f"GIT_{name}_NAME", "a")
@@ -183,16 +214,19 @@ def test_a_commit_has_records_and_markers_and_nothing_else(setting, monkeypatch)
     git(root, "init", "--quiet")
     store(setting.folder, "toy.good")
     store(setting.folder, "toy.bad")
+    (setting.folder / "bodies").mkdir()
+    (setting.folder / "bodies" / "toy.good.npz").touch()
     (setting.folder / "toy.good.curve.csv").write_text("x\n1\n")
-    commit_records(root, setting, ["toy.good"])
+    (root / "work.py").touch()
+    git(root, "add", "work.py")
+    commit_records(root, setting, "toy.good")
     assert git(root, "show", "--name-only", "--format=%s", "HEAD").split("\n") == [
-        "Records of toy.good", "", "quick/toy.good.curve.csv", "quick/toy.good.json", "stale.toml",
-        ""]
+        "Record of toy.good, quick", "", "quick/bodies/toy.good.npz", "quick/toy.good.curve.csv",
+        "quick/toy.good.json", "stale.toml", ""]
     (setting.folder / "toy.good.curve.csv").unlink()
-    commit_records(root, setting, ["toy.bad", "toy.good"])
-    assert git(root, "show", "--name-status", "--format=%s", "HEAD").split() == [
-        "Records", "of", "2", "experiments", "A", "quick/toy.bad.json", "D",
-        "quick/toy.good.curve.csv"]
+    commit_records(root, setting, "toy.good")
+    assert git(root, "show", "--name-status", "--format=", "HEAD").split() == [
+        "D", "quick/toy.good.curve.csv"]
 
 
 @pytest.mark.parametrize("source", ["unknown", "abc+changes"])
@@ -203,3 +237,28 @@ def test_records_of_no_commit_replace_none(source, monkeypatch, tmp_path):
     answer = CliRunner().invoke(cli.app, ["renew", "--results", str(tmp_path)])
     assert answer.exit_code == 2
     assert f"the source is {source}" in answer.output
+
+
+def test_the_command_runs_what_is_due_and_says_how_much(setting, monkeypatch):
+    calls = []
+
+    def run(experiments, setting, progress, **rest):
+        calls.append(([one.id for one in experiments], setting.profile, rest["timed"]))
+        return ["toy.dear"]
+
+    store(setting.folder, "toy.cheap", "0" * 16, cpu_seconds=1800.0)
+    store(setting.folder, "toy.dear", "0" * 16, cpu_seconds=3600.0)
+    store(setting.folder, "toy.times", "0" * 16, unit="x", cpu_seconds=36.0)
+    monkeypatch.setattr(cli, "discover", lambda: Catalogue(
+        {id: toys(id) for id in ("toy.cheap", "toy.dear", "toy.times")}, {}))
+    monkeypatch.setattr(cli, "commit", lambda root: "abc")
+    monkeypatch.setattr(cli, "renew_all", run)
+    words = ["renew", "--profile", "quick", "--results", str(setting.folder.parent)]
+    answer = CliRunner().invoke(cli.app, [*words, "--hours", "0.6"])
+    assert (answer.exit_code, calls.pop()) == (1, (["toy.cheap"], "quick", False))
+    assert "1 of 2 experiments that are due, 0.50 h of CPU time as recorded" in answer.output
+    assert "failed: toy.dear; its old records are left" in answer.output
+    CliRunner().invoke(cli.app, [*words, "toy.times", "--times"])
+    assert calls.pop() == (["toy.times"], "quick", True)
+    CliRunner().invoke(cli.app, words)
+    assert calls.pop() == (["toy.cheap", "toy.dear"], "quick", False)

@@ -243,13 +243,17 @@ def test_missing_results_are_named(tmp_path):
 def test_commit_says_whether_the_source_is_changed(tmp_path):
     assert commit(tmp_path) == "unknown"
     git = ["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b.c"]
-    for arguments in (["init", "-q"], ["commit", "-q", "--allow-empty", "-m", "first"]):
+    (tmp_path / "b.py").touch()
+    for arguments in (["init", "-q"], ["add", "b.py"], ["commit", "-q", "-m", "first"]):
         subprocess.run([*git, *arguments], check=True)
     clean = commit(tmp_path)
     assert len(clean) == 12
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "a.json").touch()
     assert commit(tmp_path) == clean
+    for arguments in (["add", "results"], ["commit", "-q", "-m", "results"]):
+        subprocess.run([*git, *arguments], check=True)
+    assert commit(tmp_path) == clean        # of the source, which is the same
     (tmp_path / "a.py").touch()
     assert commit(tmp_path) == clean + "+changes"
 
