@@ -143,16 +143,20 @@ def renew(
         times: Annotated[bool, typer.Option("--times", help="those with judged times, or without "
                                             "records, instead; each once other processes are idle")]
         = False,
-        commits: Annotated[bool, typer.Option("--commit", help="commit each record")] = False):
+        commits: Annotated[bool, typer.Option("--commit", help="commit each record")] = False,
+        workers: Workers = 1):
     """Run the experiments whose records are not of today's source, the cheapest first.
 
     Each runs in a process of its own and loses its marker in stale.toml. An interrupted renewal
     goes on where it stopped. The exit code is 1 where an experiment raised.
     """
     catalogue, folder, printed, source = discover(), results / profile, targets.load(), commit(ROOT)
-    setting = RunSetting(profile, folder, 0, printed, source)
+    setting = RunSetting(profile, folder, 0, printed, source, workers)
     try:
         require_clean(source)
+        if times and workers > 1:
+            raise ValueError(f"--times with --workers {workers}: times are measured one experiment "
+                             "at a time; leave out one of the two options")
         chosen = select(catalogue.experiments, ids, profile)
         all_due = due(ProfileResults(folder), chosen, profile, printed, timed=times)
         found = affordable(all_due, None if hours is None else hours * HOUR)

@@ -9,6 +9,8 @@ import json
 import subprocess
 import textwrap
 import time
+from concurrent.futures import ThreadPoolExecutor
+from threading import Lock
 from typing import NamedTuple
 
 import msgspec
@@ -87,7 +89,8 @@ def affordable(entries, seconds):
 
 
 def renew_all(experiments, setting, progress, *, timed, source, commit, find=experiment_of):
-    """Run experiments, one at a time, and return the ids of those that failed.
+    """Run experiments, as many at a time as the setting has workers, and return the ids of those
+    that failed.
 
     Args:
         experiments: a list of `Experiment`s.
@@ -96,31 +99,47 @@ def renew_all(experiments, setting, progress, *, timed, source, commit, find=exp
         timed: whether each waits for a quiet machine.
         source: called without arguments for the commit of the source, which is to stay that of
             the setting.
-        commit: called with the id of each experiment that has ended well.
+        commit: called with the id of each experiment that has ended well, once at a time.
         find: see `run_side_by_side`.
 
     Raises ValueError where the source changes meanwhile; what was kept before stays.
     """
-    failed = []
-    for one in experiments:
+    lock = Lock()
+
+    def attempt(one):
         require_same(setting.commit, source())
         if timed:
             wait_for_quiet(progress.say)
-        old = stored_files(setting.folder, one.id)
-        ended = False
+        ended = run_or_put_back(one, setting, progress, source, find)
+        if ended:
+            with lock:
+                drop_marker(setting.folder.parent / MARKERS, setting.profile, one.id)
+                commit(one.id)
+        return ended
+
+    with ThreadPoolExecutor(setting.workers) as pool:
+        futures = [pool.submit(attempt, one) for one in experiments]
         try:
-            ended = not run_in_pool([one], setting, find, progress)
-            require_same(setting.commit, source())
+            return [one.id for one, future in zip(experiments, futures, strict=True)
+                    if not future.result()]
         except BaseException:
-            put_back(setting.folder, one.id, old)
+            pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def run_or_put_back(experiment, setting, progress, source, find):
+    """Run an experiment in a process of its own and return whether it ended well; if not, its old
+    files stay. Raises ValueError where the source has changed meanwhile.
+    """
+    old, ended = stored_files(setting.folder, experiment.id), False
+    try:
+        raised_ids = run_in_pool([experiment], setting, find, progress)
+        require_same(setting.commit, source())
+        ended = not raised_ids
+    finally:
         if not ended:
-            put_back(setting.folder, one.id, old)
-            failed.append(one.id)
-            continue
-        drop_marker(setting.folder.parent / MARKERS, setting.profile, one.id)
-        commit(one.id)
-    return failed
+            put_back(setting.folder, experiment.id, old)
+    return ended
 
 
 def require_same(before, now):

@@ -151,6 +151,13 @@ def test_an_interrupted_run_leaves_the_old_records(setting, monkeypatch):
     assert renew.stored_files(setting.folder, "toy.good") == before
 
 
+def test_several_workers_keep_each_record(setting):
+    several = setting._replace(workers=2)
+    assert sorted(renewed([toys("toy.good"), toys("toy.two-parts")], several)[1]) == [
+        "toy.good", "toy.two-parts"]
+    assert ProfileResults(setting.folder).records("toy.good")[0].workers == 2
+
+
 def test_a_source_that_changes_ends_the_renewal(setting, monkeypatch):
     monkeypatch.setattr(renew, "run_in_pool", lambda *_: [])
     with pytest.raises(ValueError, match="the source changed from abc to def meanwhile"):
@@ -258,6 +265,7 @@ def test_the_command_runs_what_is_due_and_says_how_much(setting, monkeypatch):
     assert (answer.exit_code, calls.pop()) == (1, (["toy.cheap"], "quick", False))
     assert "1 of 2 experiments that are due, 0.50 h of CPU time as recorded" in answer.output
     assert "failed: toy.dear; its old records are left" in answer.output
+    assert CliRunner().invoke(cli.app, [*words, "--times", "--workers", "2"]).exit_code == 2
     CliRunner().invoke(cli.app, [*words, "toy.times", "--times"])
     assert calls.pop() == (["toy.times"], "quick", True)
     CliRunner().invoke(cli.app, words)
