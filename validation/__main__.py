@@ -136,7 +136,7 @@ def status(profile: Profile = "standard", results: Folder = RESULTS, strict: Str
 
 @app.command()
 def renew(
-        ids: Ids = None, profile: Profile = "standard", results: Folder = RESULTS,
+        ids: Ids = None, profile: Profile = "standard",
         hours: Annotated[float | None, typer.Option(
             min=0.0, help="CPU time of the experiments, as recorded, without the start of their "
             "processes; default: of all")] = None,
@@ -145,12 +145,12 @@ def renew(
         = False,
         commits: Annotated[bool, typer.Option("--commit", help="commit each record")] = False,
         workers: Workers = 1):
-    """Run the experiments whose records are not of today's source, the cheapest first.
+    """Run the experiments whose published records are not of today's source, the cheapest first.
 
     Each runs in a process of its own and loses its marker in stale.toml. An interrupted renewal
     goes on where it stopped. The exit code is 1 where an experiment raised.
     """
-    catalogue, folder, printed, source = discover(), results / profile, targets.load(), commit(ROOT)
+    catalogue, folder, printed, source = discover(), RESULTS / profile, targets.load(), commit(ROOT)
     setting = RunSetting(profile, folder, 0, printed, source, workers)
     try:
         require_clean(source)

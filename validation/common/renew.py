@@ -88,7 +88,7 @@ def affordable(entries, seconds):
     return chosen
 
 
-def renew_all(experiments, setting, progress, *, timed, source, commit, find=experiment_of):
+def renew_all(experiments, setting, progress, *, timed, source, commit):
     """Run experiments, as many at a time as the setting has workers, and return the ids of those
     that failed.
 
@@ -100,7 +100,6 @@ def renew_all(experiments, setting, progress, *, timed, source, commit, find=exp
         source: called without arguments for the commit of the source, which is to stay that of
             the setting.
         commit: called with the id of each experiment that has ended well, once at a time.
-        find: see `run_side_by_side`.
 
     Raises ValueError where the source changes meanwhile; what was kept before stays.
     """
@@ -110,7 +109,7 @@ def renew_all(experiments, setting, progress, *, timed, source, commit, find=exp
         require_same(setting.commit, source())
         if timed:
             wait_for_quiet(progress.say)
-        ended = run_or_put_back(one, setting, progress, source, find)
+        ended = run_or_put_back(one, setting, progress, source)
         if ended:
             with lock:
                 drop_marker(setting.folder.parent / MARKERS, setting.profile, one.id)
@@ -127,13 +126,13 @@ def renew_all(experiments, setting, progress, *, timed, source, commit, find=exp
             raise
 
 
-def run_or_put_back(experiment, setting, progress, source, find):
+def run_or_put_back(experiment, setting, progress, source):
     """Run an experiment in a process of its own and return whether it ended well; if not, its old
     files stay. Raises ValueError where the source has changed meanwhile.
     """
     old, ended = stored_files(setting.folder, experiment.id), False
     try:
-        raised_ids = run_in_pool([experiment], setting, find, progress)
+        raised_ids = run_in_pool([experiment], setting, experiment_of, progress)
         require_same(setting.commit, source())
         ended = not raised_ids
     finally:

@@ -117,11 +117,17 @@ def setting(tmp_path):
     return RunSetting("quick", tmp_path / "quick", commit="abc")
 
 
-def renewed(experiments, setting, timed=False, source="abc", find=toys):
+@pytest.fixture(autouse=True)
+def toys_alone(monkeypatch):
+    """Let processes find toys."""
+    monkeypatch.setattr(renew, "experiment_of", toys)
+
+
+def renewed(experiments, setting, timed=False, source="abc"):
     """Return the ids of those that failed, and of those whose records were to be committed."""
     kept = []
     return renew_all(experiments, setting, PROGRESS, timed=timed, source=lambda: source,
-                     commit=kept.append, find=find), kept
+                     commit=kept.append), kept
 
 
 def test_records_are_kept_and_committed_but_for_those_that_raised(setting):
@@ -237,11 +243,11 @@ def test_a_commit_has_the_files_of_an_experiment_and_markers_and_nothing_else(se
 
 
 @pytest.mark.parametrize("source", ["unknown", "abc+changes"])
-def test_records_of_no_commit_replace_none(source, monkeypatch, tmp_path):
+def test_records_of_no_commit_replace_none(source, monkeypatch):
     with pytest.raises(ValueError, match=r"the source is .*: records that replace published ones"):
         require_clean(source)
     monkeypatch.setattr(cli, "commit", lambda root: source)
-    answer = CliRunner().invoke(cli.app, ["renew", "--results", str(tmp_path)])
+    answer = CliRunner().invoke(cli.app, ["renew"])
     assert answer.exit_code == 2
     assert f"the source is {source}" in answer.output
 
@@ -260,7 +266,8 @@ def test_the_command_runs_what_is_due_and_says_how_much(setting, monkeypatch):
         {id: toys(id) for id in ("toy.cheap", "toy.dear", "toy.times")}, {}))
     monkeypatch.setattr(cli, "commit", lambda root: "abc")
     monkeypatch.setattr(cli, "renew_all", run)
-    words = ["renew", "--profile", "quick", "--results", str(setting.folder.parent)]
+    monkeypatch.setattr(cli, "RESULTS", setting.folder.parent)
+    words = ["renew", "--profile", "quick"]
     answer = CliRunner().invoke(cli.app, [*words, "--hours", "0.6"])
     assert (answer.exit_code, calls.pop()) == (1, (["toy.cheap"], "quick", False))
     assert "1 of 2 experiments that are due, 0.50 h of CPU time as recorded" in answer.output
