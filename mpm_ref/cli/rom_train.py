@@ -152,6 +152,7 @@ def train(
             checkpoint = out.with_suffix(".pt")
             require_map_place(out, study, overwrite)
             study = study.with_kind(kind)
+            reduce.require_one_body(study)
             require_device(study.tables.reduced_model.kind, machine.device)
             tell(f"reading {counted(len(study.train), 'run')} in {data}")
             with writing():
