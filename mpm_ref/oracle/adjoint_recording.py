@@ -159,7 +159,7 @@ class StepGradients:
                     f"largest entry of {abs(a.value).max():.1e}; this is {error:.1e} times what "
                     "round-off explains. The state stands on a kink (a yield surface, a contact "
                     "that opens, the face of a cell) and has no definite gradient: take another "
-                    "state by `--begin`, such as 50 (`begin` in Python)"
+                    "state with --begin 50, or another number of steps"
                 )
 
     def coarse_samples(self):

@@ -312,7 +312,7 @@ def as_lists(arrays):
         if np.ndim(arrays.get("mass", 0.0)) > 1:
             raise ValueError(f"mass has the shape {np.shape(arrays['mass'])} without `origin`: add "
                              "the integer coordinates of the first node of the grid, (d,); or give "
-                             "the masses of M nodes, (M,), with `nodes`, (M, d)")
+                             "the masses of M nodes, (M,), with their nodes, (M, d)")
         return arrays
     if "mass" not in arrays:
         raise ValueError("origin without mass: whole grids need `mass`, which selects their nodes; "
