@@ -45,7 +45,8 @@ app.command()(mutate)
 
 Profile = Annotated[
     Literal["quick", "standard", "paper"],
-    typer.Option(help="quick: a minute at most each; standard: hours in all; paper: as printed")]
+    typer.Option(help="quick: about a minute at most each; standard: hours in all; paper: as "
+                 "printed")]
 Folder = Annotated[Path, typer.Option("--results", help="holds a folder for each profile")]
 Workers = Annotated[int, typer.Option(min=1, help="experiments at a time, sharing the cores")]
 Scheduler = Annotated[str | None, typer.Option(
@@ -152,6 +153,7 @@ def renew(
     """
     catalogue, folder, printed, source = discover(), RESULTS / profile, targets.load(), commit(ROOT)
     setting = RunSetting(profile, folder, 0, printed, source, workers)
+    keep = partial(commit_records, ROOT, setting) if commits else lambda _: None
     try:
         require_clean(source)
         if times and workers > 1:
@@ -164,8 +166,7 @@ def renew(
                    f"{sum(one.seconds for one in found) / HOUR:.2f} h of CPU time as recorded")
         with SuiteProgress([one.experiment.seconds(profile) for one in found]) as progress:
             failed = renew_all([one.experiment for one in found], setting, progress, timed=times,
-                               source=partial(commit, ROOT),
-                               commit=partial(commit_records, ROOT, setting) if commits else len)
+                               source=partial(commit, ROOT), commit=keep)
     except (ValueError, CalledProcessError) as error:
         typer.echo(f"{error}", err=True)
         raise typer.Exit(2) from None

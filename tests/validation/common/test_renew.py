@@ -17,6 +17,7 @@ from validation.common.renew import (
     commit_records,
     drop_marker,
     due,
+    marker_text,
     renew_all,
     require_clean,
     wait_for_quiet,
@@ -24,7 +25,7 @@ from validation.common.renew import (
 from validation.common.results import RESULTS, ProfileResults
 from validation.common.run import RunSetting
 from validation.common.source_digest import source_digest
-from validation.common.standing import MarkerFile
+from validation.common.standing import Marker, MarkerFile
 from validation.common.targets import Targets
 from validation.hot.table3 import table3
 
@@ -123,10 +124,10 @@ def toys_alone(monkeypatch):
     monkeypatch.setattr(renew, "experiment_of", toys)
 
 
-def renewed(experiments, setting, timed=False, source="abc"):
+def renewed(experiments, setting, timed=False, sources=("abc",) * 5):
     """Return the ids of those that failed, and of those whose records were to be committed."""
-    kept = []
-    return renew_all(experiments, setting, PROGRESS, timed=timed, source=lambda: source,
+    kept, sources = [], iter(sources)
+    return renew_all(experiments, setting, PROGRESS, timed=timed, source=lambda: next(sources),
                      commit=kept.append), kept
 
 
@@ -164,10 +165,22 @@ def test_several_workers_keep_each_record(setting):
     assert ProfileResults(setting.folder).records("toy.good")[0].workers == 2
 
 
-def test_a_source_that_changes_ends_the_renewal(setting, monkeypatch):
-    monkeypatch.setattr(renew, "run_in_pool", lambda *_: [])
+@pytest.mark.parametrize(("sources", "runs"), [(["def"], 0), (["abc", "def"], 1)])
+def test_a_source_that_changes_ends_the_renewal(setting, monkeypatch, sources, runs):
+    """Before a run, or during it, whose records are then not kept."""
+    calls = []
+
+    def run(*_):
+        calls.append(store(setting.folder, "toy.good", "1" * 16))
+        return []
+
+    store(setting.folder, "toy.good")
+    before = renew.stored_files(setting.folder, "toy.good")
+    monkeypatch.setattr(renew, "run_in_pool", run)
     with pytest.raises(ValueError, match="the source changed from abc to def meanwhile"):
-        renewed([toys("toy.good")], setting, source="def")
+        renewed([toys("toy.good")], setting, sources=sources)
+    assert len(calls) == runs
+    assert renew.stored_files(setting.folder, "toy.good") == before
     assert (setting.folder.parent / "stale.toml").read_text() == STALE
 
 
@@ -210,6 +223,16 @@ def test_the_markers_of_the_project_are_written_as_they_are(tmp_path):
     drop_marker(file, "quick", "toy.unknown")
     assert (msgspec.toml.decode(file.read_bytes(), type=MarkerFile)
             == msgspec.toml.decode(content, type=MarkerFile))
+
+
+def test_ids_with_hyphens_stay_whole_where_lines_are_broken(tmp_path):
+    ids = [f"toy.{'a' * k}-runs" for k in range(40)]
+    file = tmp_path / "stale.toml"
+    file.write_text(marker_text(Marker("quick", [*ids, "toy.good"], "of late")))
+    drop_marker(file, "quick", "toy.good")
+    assert msgspec.toml.decode(file.read_bytes(), type=MarkerFile).marker == [
+        Marker("quick", ids, "of late")]
+    assert max(map(len, file.read_text().splitlines())) <= 100
 
 
 # Commits
