@@ -18,6 +18,7 @@ from scipy.interpolate import BSpline
 from scipy.optimize import minimize
 
 SPLINE = BSpline.basis_element(np.arange(5) - 2.0, extrapolate=False)
+SIZES = 1.0, 0.03       # of starts on the axis of the cone
 
 
 class SandProblem(NamedTuple):
@@ -53,16 +54,21 @@ def nearest(eps, k, weight, keeps_trace):
     """Return the strain (3,) of the cone that is nearest to eps (3,), which is of size 1 or so.
 
     The distance is |a|^2 + weight b^2, with a and b the differences of eps_hat and of tr eps; if
-    keeps_trace, b = 0. The tip is tried by itself.
+    keeps_trace, b = 0. The tip is tried by itself. SLSQP starts from SIZES, since from a
+    single one its rounding lets it stall at the tip for a few strains.
     """
     basis = np.array([[1, 1, 1], [1, -1, 0], [1, 1, -2]]) / np.sqrt([[3], [2], [6]])
     goal, metric, cone = basis @ eps, *np.array([[3 * weight, 1, 1], [3 * k**2, -1, -1]])
     inside = {"type": "ineq", "fun": lambda y: cone @ y**2, "jac": lambda y: 2 * cone * y}
-    y = minimize(lambda y: metric @ (y - goal)**2, [-abs(goal[0]), 0, 0], method="SLSQP",
-                 jac=lambda y: 2 * metric * (y - goal), constraints=inside, tol=1e-16,
-                 bounds=[(goal[0],) * 2 if keeps_trace else (None, 0), *[(None, None)] * 2]).x
-    tip_wins = not keeps_trace and metric @ goal**2 <= metric @ (y - goal)**2
-    return np.zeros(3) if tip_wins else y @ basis
+    bounds = [(goal[0],) * 2 if keeps_trace else (None, 0), *[(None, None)] * 2]
+
+    def distance(y):
+        return metric @ (y - goal)**2
+
+    found = [minimize(distance, [-size * abs(goal[0]), 0, 0], method="SLSQP", bounds=bounds,
+                      jac=lambda y: 2 * metric * (y - goal), constraints=inside, tol=1e-16).x
+             for size in SIZES]
+    return min(found if keeps_trace else [*found, np.zeros(3)], key=distance) @ basis
 
 
 def splines(x, dx, shape):

@@ -69,8 +69,7 @@ def test_return_map_of_sand_is_a_projection_in_two_regions_alone():
     assert distances["on the cone"].max() <= PROJECTION
     assert distances["at the tip"].max() <= PROJECTION
     assert distances["pressed, any trace"].min() > 1e-3
-    assert np.sort(distances["between"])[1] > 1e-3      # once SLSQP has stalled at the tip, in one
-                                                        # of several runs with the same strains
+    assert distances["between"].min() > 1e-3
 
 
 # fluid
