@@ -22,7 +22,7 @@ from ..rom.study.generate import (
 )
 from ..rom.study.record import supported_model
 from ..rom.study.study import training_hints
-from ..rom.study.tables import KEYS, NETWORK, NSF
+from ..rom.study.tables import KEYS, LDM, NETWORK, NSF
 from ..store.atomic import require_place
 from ..store.text import counted
 from ..training import DEVICES, Machine
@@ -152,7 +152,8 @@ def train(
             checkpoint = out.with_suffix(".pt")
             require_map_place(out, study, overwrite)
             study = study.with_kind(kind)
-            reduce.require_one_body(study)
+            if study.tables.model == LDM:
+                reduce.require_one_body(study)
             require_device(study.tables.reduced_model.kind, machine.device)
             tell(f"reading {counted(len(study.train), 'run')} in {data}")
             with writing():
