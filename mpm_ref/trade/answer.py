@@ -26,6 +26,7 @@ def answer_of(search, name, compared=None, budget=None):
     name: that of the scene; compared: {name: `RunObservation`} of results files; budget [s].
     """
     best, horizon = search.best(), search.horizon()
+    kept = set(search.keeping(search.settings())) if horizon > 0.0 else set()
     as_given = search.observations.get(AS_GIVEN)
     facts = {
         "scene": name, "dim": search.scene.dim, "version": __version__, "error": search.error,
@@ -39,7 +40,8 @@ def answer_of(search, name, compared=None, budget=None):
         "best": None if best is None else best.text,
         "start_fault": "" if best is None else start_fault(search, best),
         "warnings": [] if as_given is None else list(as_given.warnings),
-        "rows": [row(search, chosen) for chosen in ranked(search)],
+        "rows": [row(search, chosen, chosen == best, chosen in kept)
+                 for chosen in ranked(search)],
         "compared": [compared_row(search, file, run) for file, run in (compared or {}).items()],
     }
     return facts | {"advice": advice_lines(facts)}
@@ -70,12 +72,11 @@ def ranked(search):
     return sorted(search.settings(), key=rank)
 
 
-def row(search, chosen):
-    """Return the facts of one setting."""
+def row(search, chosen, is_best, keeps):
+    """Return the facts of one setting, which may be the best, and may keep the error."""
     run = search.observations[chosen]
     return {"setting": dict(chosen.items), "text": chosen.text, **run_facts(search, run),
-            "keeps": bool(search.horizon() > 0.0 and search.keeps(chosen)),
-            "best": chosen == search.best(), "as_given": chosen == AS_GIVEN,
+            "keeps": keeps, "best": is_best, "as_given": chosen == AS_GIVEN,
             "family": without_grid(chosen).text}
 
 

@@ -235,20 +235,27 @@ class TradeSearch:
         finest = self.error_of_run(self.observations[setting(dx=self.levels[-1])], (text,), -1)
         return float(max(own / REFERENCE_PART, own + finest, self.divergence(text)[-1] / DIVERGED))
 
-    def keeps(self, chosen):
-        """Return whether a setting keeps the error asked, that of the reference included, with
-        its bodies whole.
+    def keeping(self, settings):
+        """Return those of some settings that keep the error asked, that of the reference included,
+        with their bodies whole.
         """
-        run = self.observations.get(chosen)
-        return (run is not None and run.is_sound
-                and self.error_of_run(run) + self.reference_error() <= self.error)
+        if not self.references:
+            return []
+        k, own = self.last, self.reference_error()
+        runs = {chosen: self.observations.get(chosen) for chosen in settings}
+        return [chosen for chosen, run in runs.items() if run is not None and run.is_sound
+                and self.error_of_run(run, k=k) + own <= self.error]
+
+    def keeps(self, chosen):
+        """Return whether a setting keeps the error asked, as `keeping` says."""
+        return bool(self.keeping([chosen]))
 
     def best(self):
         """Return the cheapest setting that keeps the error, or None."""
         if not self.references or self.horizon() <= 0.0:
             return None
-        good = [s for s in self.settings() if self.keeps(s)]
-        return min(good, key=lambda s: self.observations[s].cost.cpu, default=None)
+        return min(self.keeping(self.settings()), key=lambda s: self.observations[s].cost.cpu,
+                   default=None)
 
     def settings(self):
         """Return all settings with an observation."""
@@ -281,19 +288,20 @@ class TradeSearch:
         """
         walking = list(families)
         for factor in self.grids():
+            best = self.best()
             batch = {family: chosen for family in walking
-                     if self.worth_trying(chosen := family | setting(dx=factor))}
+                     if self.is_worth_trying(chosen := family | setting(dx=factor), best)}
             self.observe(sorted(batch.values(), key=self.expected_cpu))
-            walking = [family for family, chosen in batch.items() if not self.keeps(chosen)]
+            kept = set(self.keeping(batch.values()))
+            walking = [family for family, chosen in batch.items() if chosen not in kept]
 
     def grids(self):
         """Return the factors of dx of the grids that the scene can have, the coarsest first."""
         return [factor for factor in GRIDS
                 if not isinstance(self._scene_at(setting(dx=factor)), SceneError)]
 
-    def worth_trying(self, chosen):
+    def is_worth_trying(self, chosen, best):
         """Return whether a setting may still be cheaper than the best one; none without one."""
-        best = self.best()
         if best is None:
             return False
         return (chosen in self.observations
@@ -301,10 +309,12 @@ class TradeSearch:
 
     def promising_pairs(self):
         """Return the pairs of the single knobs that keep the error cheapest."""
+        if self.best() is None:
+            return []
         best = {}
-        for chosen in self.settings():
+        for chosen in self.keeping(self.settings()):
             knobs = without_grid(chosen)
-            if len(knobs.items) == 1 and self.best() is not None and self.keeps(chosen):
+            if len(knobs.items) == 1:
                 best[knobs] = min(best.get(knobs, np.inf), self._cost(chosen))
         return pairs(sorted(best, key=best.get)[:BEST_SINGLES])
 

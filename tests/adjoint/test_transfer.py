@@ -22,6 +22,7 @@ from adjoints import (
 from clouds import Case, cloud, scattered
 from problems import run_python
 from threads import MOST, by_threads
+from variants import slow_but
 
 from mpm_ref.core.adjoint.records import packed_velocities
 from mpm_ref.core.adjoint.shape_gradient import curvatures
@@ -190,8 +191,8 @@ def bits_are_the_same(case):
 
 
 @pytest.mark.skipif(MOST < 2, reason="one core")
-@pytest.mark.parametrize("case", [*CASES, Case("apic", 2, 3), Case("pic", 3, 3)],
-                         ids=lambda case: case.name)
+@pytest.mark.parametrize("case", slow_but([*CASES, Case("apic", 2, 3), Case("pic", 3, 3)],
+                                          *CASES[1:3]), ids=lambda case: case.name)
 def test_two_threads_give_the_same_bits(case):
     assert bits_are_the_same(case)
 

@@ -9,6 +9,7 @@ import pytest
 import rom_toys
 import threadpoolctl
 from problems import run_python
+from variants import slow_but
 
 from mpm_ref.rom.fields.network import Decoder, DecoderUnits
 from mpm_ref.rom.fields.perceptron import ROWS, for_batches, layers_of, network
@@ -149,7 +150,7 @@ def digest():
     return sha.hexdigest()
 
 
-@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("threads", slow_but([1, 2], 2))
 def test_any_number_of_threads_gives_the_same_bits(threads):
     count = str(threads)
     found = run_python(DIGEST, NUMBA_NUM_THREADS=count, OPENBLAS_NUM_THREADS=count)

@@ -7,6 +7,7 @@ import pytest
 from far_bodies import FAST, advanced, dense, far_bodies, sparse
 from problems import DT, DX, ball, digest, moving
 from threads import by_threads
+from variants import slow_but
 
 from mpm_ref import oracle
 from mpm_ref.core.boundary import BoxWalls, Collider, Conditions, Prescribed
@@ -45,7 +46,7 @@ def both(make, steps=STEPS):
     return one, two, kinds
 
 
-@pytest.mark.parametrize("name", SCHEMES)
+@pytest.mark.parametrize("name", slow_but(SCHEMES, "mls-2d", "mls-3d", "flip-gimp-2d"))
 def test_bodies_that_meet_have_the_bits_of_a_dense_grid(name):
     """Three islands, then two of them merge, through several sorts; the drop falls far away."""
     scheme, d = SCHEMES[name]

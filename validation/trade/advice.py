@@ -162,7 +162,7 @@ def case_of(name, search, truth, cpu):
 def advice(run):
     """Judge the advice on all scenes."""
     scenes = advice_scenes()
-    chosen = run.choose(quick=[s for s in scenes if s.name == "slide"], standard=scenes)
+    chosen = run.choose(quick=[s for s in scenes if s.name == "stick"], standard=scenes)
     sweep = run.choose(quick=False, standard=True)
     cases = []
     for one in run.progress(chosen, "scenes"):
