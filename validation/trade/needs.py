@@ -101,7 +101,7 @@ class Lean(NamedTuple):
             profiles=("quick", "standard"), budget={"quick": 60, "standard": 1800})
 def needs(run):
     """Judge the claims on all scenes."""
-    names = run.choose(quick=("slope",), standard=(*JUDGED, SOLID))
+    names = run.choose(quick=("stick",), standard=(*JUDGED, SOLID))
     scenes = {one.name: one.scene for one in advice_scenes()} | {SOLID: loads(CHANNEL)}
     texts = {name: scenes[name] for name in names}
     rows = [Lean(*run.cached(name, lambda name=name, scene=scene: list(lean_of(name, scene))))
