@@ -246,10 +246,6 @@ class TradeSearch:
         return [chosen for chosen, run in runs.items() if run is not None and run.is_sound
                 and self.error_of_run(run, k=k) + own <= self.error]
 
-    def keeps(self, chosen):
-        """Return whether a setting keeps the error asked, as `keeping` says."""
-        return bool(self.keeping([chosen]))
-
     def best(self):
         """Return the cheapest setting that keeps the error, or None."""
         if not self.references or self.horizon() <= 0.0:

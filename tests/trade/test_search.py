@@ -44,11 +44,11 @@ def test_walks_begin_on_the_coarsest_grid_and_end_where_the_error_is_kept():
         return [s.get("dx") for s in search.settings() if without_grid(s) == setting(**knobs)]
     kept = grids(transfer="apic")
     assert kept == list(GRIDS[:len(kept)])
-    keeps = [search.keeps(setting(transfer="apic", dx=factor)) for factor in kept]
+    keeps = [bool(search.keeping([setting(transfer="apic", dx=factor)])) for factor in kept]
     assert keeps == [False] * (len(kept) - 1) + [True]
     dear = grids(cfl=0.25)
     assert dear == list(GRIDS[:len(dear)])
-    assert not any(search.keeps(setting(cfl=0.25, dx=factor)) for factor in dear)
+    assert not search.keeping([setting(cfl=0.25, dx=factor) for factor in dear])
     following = setting(cfl=0.25, dx=GRIDS[len(dear)])
     assert search.expected_cpu(following) > search.expected_cpu(search.best()) / CHEAPER
 
@@ -275,4 +275,4 @@ def test_a_stopped_setting_is_not_an_error():
     stopped = RunObservation({"positions": EXACT[:, :0]}, RunCost(cpu=0.0), STOPPED)
     search.observations[setting(cfl=0.1)] = stopped
     assert search.error_of(setting(cfl=0.1)) == np.inf
-    assert not search.keeps(setting(cfl=0.1))
+    assert not search.keeping([setting(cfl=0.1)])
