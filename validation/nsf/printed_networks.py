@@ -54,7 +54,7 @@ def trained_as_printed(name):
 
 
 @experiment("nsf.networks-printed", title="NSF: networks with the printed widths and encoder",
-            profiles=("standard",), budget={"standard": 4000})
+            profiles=("standard",), budget={"standard": 7000})
 def networks_as_printed(run):
     """Record the errors of these networks on their training runs, and of reduced runs on them."""
     rows = []
