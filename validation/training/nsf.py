@@ -21,6 +21,7 @@ from mpm_ref.training import DEVICES, Machine, TrainingTime
 
 from ..nsf.networks import FOLDER, identity, narrow, nets
 from ..nsf.printed_networks import printed_nets
+from ..nsf.printed_rates import rates_nets
 from .common import CHECKPOINTS, Checkpoints, Device, Folder, Names, Threads, origin, train_all
 
 SHOWN = 50                  # epochs of which the loss is stored
@@ -68,7 +69,7 @@ class ProgressBar:
 
 def trainings():
     """Return {name: `FieldsNet`} of all trainings."""
-    return nets() | narrow() | printed_nets()
+    return nets() | narrow() | printed_nets() | rates_nets()
 
 
 def trained_fields(name, checkpoints, machine):

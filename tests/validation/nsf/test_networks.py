@@ -18,7 +18,7 @@ from validation.common.weights_needed import Untrained
 from validation.nsf import networks as kept
 from validation.nsf import networks_runs as runs
 from validation.nsf import printed_networks as as_printed
-from validation.nsf import reduced_runs
+from validation.nsf import printed_rates, reduced_runs
 from validation.nsf.networks import (
     FieldsNet,
     NetworkPlan,
@@ -250,6 +250,28 @@ def test_errors_of_networks_as_printed_are_those_of_their_runs(folder, monkeypat
     assert found[".stress"] == pytest.approx(20.0)
     assert found[".nearest"] == pytest.approx(0.1)
     assert found[".fit.displacement"] == pytest.approx(4.0)
+
+
+def test_networks_of_each_rate_differ_from_those_as_printed_by_five_times_the_epochs():
+    """Five rates, 300, 600 and 600 epochs at each (NSF-train)."""
+    printed, net = as_printed.printed_nets()["jelly-printed"], printed_rates.rates_nets()
+    assert net.keys() == {"jelly-rates"}
+    assert [own.epochs for own in net["jelly-rates"][1:4]] == [1500, 3000, 3000]
+    assert net["jelly-rates"]._replace(g=printed.g, h=printed.h, l=printed.l) == printed
+
+
+def test_errors_of_networks_of_each_rate_are_those_of_their_runs(folder, monkeypatch):
+    about = {"errors": {"displacement": 0.04, "stress": 0.3, "affine": 0.2}}
+    monkeypatch.setattr(printed_rates, "rates_nets", lambda: {"jelly-rates": NET})
+    monkeypatch.setattr(printed_rates, "trained_at_each_rate",
+                        lambda name: model()._replace(about=about))
+    monkeypatch.setattr(printed_rates, "fit_to_networks", ready)
+    assert run_all([printed_rates.networks_at_each_rate.experiment],
+                   RunSetting("standard", folder / "out")) == []
+    found = {r.target.removeprefix("nsf.networks-rates.jelly-rates"): r.value
+             for r in ProfileResults(folder / "out").records("nsf.networks-rates")}
+    assert found == pytest.approx(found | {"": 2.0, ".nearest": 0.1, ".stress": 20.0,
+                                           ".fit.stress": 30.0, ".fit.affine": 20.0})
 
 
 def test_every_scene_has_the_id_of_a_printed_error():
