@@ -13,7 +13,8 @@ from time import process_time
 
 import numpy as np
 
-from mpm_ref.cli.catalogue import bundled_scenes, find_study
+from mpm_ref.cli.catalogue import bundled_scenes
+from mpm_ref.cli.study_kinds import find_reduced_study
 from mpm_ref.executor import open_executor
 from mpm_ref.rom.study.generate import file_of, generate_run, one_thread
 from mpm_ref.rom.study.study import load
@@ -58,7 +59,7 @@ def experiment_seconds(folder=RESULTS / "standard"):
 
 def run_seconds(name=STUDY):
     """Return the CPU seconds of each full-order run of a study; kernels are compiled before."""
-    study, seconds = load(find_study(name), bundled_scenes()), []
+    study, seconds = load(find_reduced_study(name), bundled_scenes()), []
     with TemporaryDirectory() as folder, one_thread():
         generate_run(study, folder, 0)
         file_of(folder, 0).unlink()

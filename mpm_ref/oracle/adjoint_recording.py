@@ -158,8 +158,8 @@ class StepGradients:
                     f"{key} in step {k}: kernels and plain twin differ by {own[key]:.1e}, with a "
                     f"largest entry of {abs(a.value).max():.1e}; this is {error:.1e} times what "
                     "round-off explains. The state stands on a kink (a yield surface, a contact "
-                    "that opens, the face of a cell) and has no definite gradient: take another "
-                    "state with --begin 50, or another number of steps"
+                    "that opens, the face of a cell) and has no definite gradient: record "
+                    "later steps (--begin K), or another number of them"
                 )
 
     def coarse_samples(self):

@@ -2,6 +2,7 @@
 
 import pytest
 
+from benchmarks import many_workers
 from benchmarks.many_workers import simulated_rows, wall_time
 
 
@@ -21,3 +22,15 @@ def test_efficiency_beside_free_scheduling():
     rows = simulated_rows("toy", [1.0] * 1000, 0.0)
     assert [row["efficiency"] for row in rows if row["workers"] in (1, 2, 8, 1000)] == [1.0] * 4
     assert rows[-1]["wall_s"] == 1.0
+
+
+def test_all_runs_of_the_study_are_timed(monkeypatch):
+    def generate(study, folder, k):
+        made.append(k)
+        many_workers.file_of(folder, k).write_bytes(b"")
+
+    made = []
+    monkeypatch.setattr(many_workers, "generate_run", generate)
+    seconds = many_workers.run_seconds()
+    assert made == [0, *range(len(seconds))]    # the first one compiles
+    assert len(seconds) > 1

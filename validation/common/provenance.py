@@ -119,10 +119,14 @@ def commit(root):
 
 
 def _git(root, *arguments):
-    """Return the output of a git command, empty where git or the repository is missing."""
+    """Return the output of a git command, empty where git or the repository is missing.
+
+    It takes no lock that a commit beside it would wait for.
+    """
     try:
         process = subprocess.run(
-            ["git", *arguments], cwd=root, capture_output=True, text=True, check=True)
+            ["git", "--no-optional-locks", *arguments], cwd=root, capture_output=True, text=True,
+            check=True)
     except (OSError, subprocess.CalledProcessError):
         return ""
     return process.stdout.strip()

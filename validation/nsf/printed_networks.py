@@ -6,7 +6,7 @@ the other two networks at each of five rates; it could mean these numbers in tot
 Its trainings take 2 to 20 hours on a graphics processor. Here each batch shows a part of the
 points, drawn anew, which leaves the number of steps of the optimiser as it is.
 Each is a file of weights, made by `python -m validation.training.nsf NAME --folder
-results/training`; of 8 MB, it is not in the repository.
+results/training`; of 5 to 10 MB, it is not in the repository.
 """
 
 from functools import cache

@@ -216,11 +216,12 @@ def test_a_marker_loses_an_id_and_what_is_left_stays_as_it_is(tmp_path):
     drop_marker(tmp_path / "none.toml", "quick", "toy.good")
 
 
-def test_the_markers_of_the_project_are_written_as_they_are(tmp_path):
+def test_the_other_markers_of_the_project_are_written_as_they_are(tmp_path):
     file = tmp_path / "stale.toml"
-    content = (RESULTS / "stale.toml").read_bytes()
-    file.write_bytes(content)
-    drop_marker(file, "quick", "toy.unknown")
+    content = (RESULTS / "stale.toml").read_text()
+    file.write_text(content + "\n" + marker_text(Marker("quick", ["toy.good"], "of late")))
+    drop_marker(file, "quick", "toy.good")
+    assert "toy.good" not in file.read_text()
     assert (msgspec.toml.decode(file.read_bytes(), type=MarkerFile)
             == msgspec.toml.decode(content, type=MarkerFile))
 
