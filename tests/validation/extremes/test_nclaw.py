@@ -10,7 +10,7 @@ from mpm_ref.materials import Fluid, NoFlow
 from mpm_ref.materials.learned.strain_range import strain_bounds
 from mpm_ref.nclaw.bodies import body_maker, body_with_laws
 from mpm_ref.nclaw.strain_watch import StrainReport
-from mpm_ref.scene import build
+from mpm_ref.scene import Mesh, Transformed, build
 from validation.common.scenes import with_
 from validation.common.weights_needed import Untrained, load_available
 from validation.extremes import nclaw_extrapolation as extrapolation
@@ -37,6 +37,8 @@ from validation.nclaw.environments import environment
 from validation.nclaw.initial_laws import untrained
 from validation.nclaw.small_runs import Measured
 from validation.nclaw.small_trainings import Small
+from validation.nclaw.stand_in_bodies import STAND_INS
+from validation.nclaw.tasks import geometry
 from validation.nclaw.trained_laws import LawNet
 
 GOOD = LawEnd(1e-4, 1000, -1, "", 0.1, -1, 0.9, 0.01, "")
@@ -327,3 +329,13 @@ def test_a_run_that_stops_is_bad_whatever_is_usual():
 def test_laws_with_a_large_error_on_their_own_run_are_flagged():
     assert nclaw_runs.flagged_as_poor(GOOD).flags == "poor"
     assert nclaw_runs.flagged_as_poor(GOOD._replace(flags="dt", first=3))[2:4] == (0, "dt poor")
+
+
+def test_the_guarded_body_is_the_stand_in_also_where_the_mesh_is_there(monkeypatch):
+    there = geometry("water")
+    mesh = with_(there, body=(with_(there.body[0], shape=Mesh(file="spot.obj", size=0.8)),))
+    monkeypatch.setattr(guards, "geometry", lambda name: mesh)
+    scene = guards.stand_in_scene("water")
+    assert scene.body[0].shape == Transformed(
+        shape=STAND_INS["spot"], scale=0.8, about=(0.0, 0.0, 0.0), translate=(0.5, 0.5, 0.5))
+    assert with_(scene, body=mesh.body) == mesh
